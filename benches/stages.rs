@@ -240,7 +240,7 @@ fn power(given: Rendering<'_>) -> Vec<Way<'_>> {
 /// The echoes with noise, and with a single look of speckle of a form.
 fn speckled(given: Rendering<'_>, form: Option<SpeckleForm>) -> impl Fn() -> Scan + '_ {
     let mut radar = given.setup.geometry.radar.clone();
-    radar.speckle = form.map(|form| Speckle { looks: 1.0, form: Some(form) });
+    radar.speckle = form.map(|form| Speckle { looks: 1.0, form: Some(form), ..Default::default() });
     move || {
         let geometry = ScanGeometry { radar: &radar, ..given.setup.geometry };
         shaded(&Setup { geometry, ..*given.setup }, given.footprints)

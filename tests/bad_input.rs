@@ -394,8 +394,12 @@ fn instruments_that_cannot_work() {
         (format!("{receiver}[spot]\nrays = 4\n"), &["[radar.speckle]", "looks"]),
         (format!("{receiver}[bounce]\n"), &["[radar.speckle]", "[bounce]"]),
         (
-            "[radar.speckle]\ncoherent_ratio = 2\n".to_owned(),
-            &["coherent_ratio is no longer a key", "follows from the material"],
+            "[radar.speckle]\nform = \"law\"\ncoherent_ratio = 2\n".to_owned(),
+            &["coherent_ratio is not a key with a form", "follows from the material"],
+        ),
+        (
+            "[radar.beam]\nfocus_m = 10000\n[radar.speckle]\nform = \"scatterers\"\n".to_owned(),
+            &["squares of their waist", "1.3e8", "radar.beam.focus_m", "independent"],
         ),
         (
             format!("{receiver}[radar.speckle]\nform = \"law\"\n[spot]\nrays = 4\n"),
@@ -406,7 +410,7 @@ fn instruments_that_cannot_work() {
             &["radar.phases = true", "radar.speckle.looks = 4 has no phase"],
         ),
         (
-            "[radar.speckle]\nlooks = 2.5\n".to_owned(),
+            "[radar.speckle]\nform = \"law\"\nlooks = 2.5\n".to_owned(),
             &["radar.speckle.looks = 2.5", "a whole number from 1 to 256", "independent"],
         ),
         (
@@ -458,6 +462,36 @@ fn instruments_that_cannot_work() {
     fs::write(folder.path().join("scene.toml"), PLATE).unwrap();
     let arguments = ["render", "--beat", "scene.toml", "-o", "out"];
     check(&refused(matdb(folder.path()).args(arguments)), &["--beat", "[radar.receiver]"]);
+}
+
+#[test]
+fn speckle_as_0_1_0_had_it_renders_and_says_what_changed() {
+    let render = |table: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let scan = "[radar.scan]\npattern = \"raster\"\nlines = 20\nchirps_per_line = 20\n";
+        let scene = PLATE.replacen("[[mesh]]", &format!("{scan}{table}\n[[mesh]]"), 1);
+        fs::write(folder.path().join("scene.toml"), scene).unwrap();
+        let arguments = ["render", "scene.toml", "-o", "out"];
+        let output = matdb(folder.path()).args(arguments).output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{said}");
+        let cloud = fs::read(folder.path().join("out/cloud.ply")).unwrap();
+        (said, cloud, fs::read_to_string(folder.path().join("out/scan.json")).unwrap())
+    };
+    for (keys, words) in [
+        ("looks = 2.5", "radar.speckle.looks = 2.5 is drawn anew for every chirp, as in 0.1.0"),
+        ("looks = 1000", "radar.speckle.looks = 1000 is drawn anew for every chirp, as in 0.1.0"),
+        ("coherent_ratio = 3", "radar.speckle.coherent_ratio = 3 is ignored"),
+    ] {
+        let (said, cloud, record) = render(&format!("[radar.speckle]\n{keys}\n"));
+        assert_eq!(said.matches(words).count(), 1, "{said}");
+        assert!(record.contains("\"form\": \"independent\""), "{record}");
+        let looks = keys.strip_prefix("coherent_ratio = 3").map_or(keys, |_| "looks = 1");
+        let stated = format!("[radar.speckle]\n{looks}\nform = \"independent\"\n");
+        let (said, as_stated, _) = render(&stated);
+        assert!(!said.contains("0.1.0"), "{said}");
+        assert!(cloud == as_stated, "{keys}: the form is as if it were stated");
+    }
 }
 
 #[test]

@@ -78,6 +78,53 @@ fn a_sound_database_passes_and_nothing_is_missed_in_a_changed_one() {
     }
 }
 
+/// A scene of a plate at the focus.
+const PLATE: &str = "
+[radar.scan]
+pattern = \"raster\"
+lines = 15
+chirps_per_line = 15
+width_m = 0.02
+height_m = 0.02
+[[mesh]]
+name = \"plate\"
+file = \"builtin:plate\"
+size_m = [1, 1, 0]
+translation_m = [0, 1.1, 0]
+[[region]]
+name = \"all\"
+material = \"glare\"
+";
+
+#[test]
+fn a_curve_above_a_mirror_is_named_by_add_check_and_render() {
+    for (peak_db, words) in [
+        (45, "dB more than a mirror at an incidence of 0.0°, seen by a beam of 0.67°"),
+        (30, "less than the beam of 0.67° that sees it"),
+        (3, ""),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let curve = format!("theta_deg,sigma0_db\n0,{peak_db}\n0.3,2\n30,-10\n60,-20\n");
+        fs::write(folder.path().join("glare.csv"), curve).unwrap();
+        fs::write(folder.path().join("scene.toml"), PLATE).unwrap();
+        let add = "add --from glare.csv --name glare --class metal --kind synthetic --source made --licence CC0-1.0 \
+                   --instrument radar --frequency 300 --threshold -77";
+        for arguments in [add, "check", "render scene.toml -o out"] {
+            let mut run = matdb(folder.path());
+            let output = run.args(arguments.split_whitespace()).output().unwrap();
+            let said = String::from_utf8(output.stderr).unwrap()
+                + &String::from_utf8(output.stdout).unwrap();
+            assert!(output.status.success(), "{said}");
+            let is_named = said.contains("than a mirror") || said.contains("than the beam");
+            assert_eq!(is_named, !words.is_empty(), "{peak_db} {arguments}: {said}");
+            assert!(said.contains(words), "{peak_db} {arguments}: {said}");
+            // The strongest detection is above −5.5 dBm and below the 7 dBm that were sent.
+            let is_above = said.contains("exceeds the -5.5 dBm that were sent less system_loss_db");
+            assert_eq!(is_above, peak_db == 45 && arguments.starts_with("render"), "{said}");
+        }
+    }
+}
+
 #[test]
 fn a_missing_database_is_said_to_be_missing() {
     let folder = tempfile::tempdir().unwrap();

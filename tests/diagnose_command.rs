@@ -260,10 +260,6 @@ fn nothing_detected_and_scenes_that_no_diagnosis_predicts_are_said() {
         assert!(message.contains("more.toml") && message.contains(way_out), "{message}");
         assert!(!at.join("more").exists());
     }
-    fs::write(at.join("more.toml"), scene.replace("looks = 4", "looks = 4\ncoherent_ratio = 2"))
-        .unwrap();
-    let coherent = ["diagnose", "out/cloud.ply", "--scene", "more.toml", "-o", "more"];
-    assert!(refused(matdb(at).args(coherent)).contains("coherent_ratio is no longer a key"));
     let unknown = ["diagnose", "out/cloud.ply", "--scene", "scene.toml", "-o", "more"];
     let message = refused(matdb(at).args(unknown).args(["--effects", "unknown"]));
     assert!(message.contains("always looked for"), "{message}");

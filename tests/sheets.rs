@@ -648,6 +648,54 @@ fn what_cannot_transmit_is_refused_in_a_sentence() {
 }
 
 #[test]
+fn a_sheet_with_gain_is_named_with_its_incidence_and_excess() {
+    let folder = tempfile::tempdir().unwrap();
+    let chalk = |albedo: f64| {
+        format!(
+            r#"
+slug = "chalk"
+name = "Chalk for tests"
+class = "mineral"
+licence = "CC0-1.0"
+frequency_ghz = [200, 400]
+theta_deg = [0, 90]
+render = "law"
+[[source]]
+key = "here"
+kind = "synthetic"
+title = "Made for tests"
+[[permittivity]]
+key = "chalk"
+source = "here"
+frequency_ghz = 300
+real = 1.1
+imaginary = 0
+[[fit]]
+name = "law"
+estimator = "assumed"
+source = "here"
+scattering = {{ model = "lambert", albedo = {albedo} }}
+"#
+        )
+    };
+    let file = scene(folder.path(), "", "chalk", "thickness_m = 0.0005");
+    for (albedo, is_named) in [(1.0, true), (0.1, true), (0.004, false)] {
+        std::fs::write(folder.path().join("chalk.toml"), chalk(albedo)).unwrap();
+        matdb(folder.path()).args(["add", "-q", "--from", "chalk.toml"]).assert().success();
+        let output =
+            matdb(folder.path()).args(["render", "-o", "out"]).arg(&file).output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{said}");
+        let words = "the sheet of region `cloth`, the law of `chalk` with what its permittivity lets through, returns";
+        assert_eq!(said.matches(words).count(), usize::from(is_named), "{albedo}: {said}");
+        if albedo == 1.0 {
+            assert!(said.contains("returns 100 % of what it receives"), "{said}");
+            assert!(said.contains("% too much; nothing is cut off"), "{said}");
+        }
+    }
+}
+
+#[test]
 fn a_ray_ends_at_the_sheet_after_the_last_that_it_may_pass() {
     let folder = tempfile::tempdir().unwrap();
     let file = scene(folder.path(), "[transmission]\nsheets = 1\n", "kapton", "transmits = true");

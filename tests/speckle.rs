@@ -26,7 +26,7 @@ fn radar(scan: Pattern, form: SpeckleForm, looks: f64) -> Radar {
     let mut radar = Radar {
         scan,
         threshold_dbm: -300.0,
-        speckle: Some(Speckle { looks, form: Some(form) }),
+        speckle: Some(Speckle { looks, form: Some(form), ..Default::default() }),
         ..Radar::default()
     };
     radar.beam.edge_growth = 1.0;
@@ -355,9 +355,11 @@ fn several_looks_have_no_phase_and_beats_of_several_paths_no_law() {
     let mut radar = radar(Pattern::Elliptical(Elliptical::default()), SpeckleForm::Law, 4.0);
     radar.phases = true;
     assert!(refused(&radar).contains("has no phase; set looks = 1"));
-    radar.speckle = Some(Speckle { looks: 1.0, form: Some(SpeckleForm::Independent) });
+    radar.speckle =
+        Some(Speckle { looks: 1.0, form: Some(SpeckleForm::Independent), ..Default::default() });
     assert!(refused(&radar).contains("a law of powers without phases"));
-    radar.speckle = Some(Speckle { looks: 1.0, form: Some(SpeckleForm::Law) });
+    radar.speckle =
+        Some(Speckle { looks: 1.0, form: Some(SpeckleForm::Law), ..Default::default() });
     radar.phases = false;
     radar.receiver = Some(Default::default());
     let mesh = plate();

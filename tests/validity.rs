@@ -187,6 +187,43 @@ fn a_single_ray_on_a_ball_is_named_where_the_ball_is_curved_within_the_spot() {
     assert_eq!(rendered_with(&with_effect, &sheet(LOBE, "")), (vec![], vec![]));
 }
 
+/// Polished metal: its lobe is the beam's, 0.0117 rad or 0.671° wide.
+const POLISHED: &str = r#"model = "fresnel", eps_real = 1, eps_imag = 1e9"#;
+
+#[test]
+fn facets_that_step_over_the_lobe_of_a_mirror_are_named_with_the_way_out() {
+    let (said, listed) = rendered_with(&ball(0.15, 16), &sheet(POLISHED, ""));
+    assert_eq!((said.len(), listed.len()), (1, 1), "{said:?}");
+    for words in [
+        "`sheet` on `all`: a mesh of facets holds for a step between the normals of neighbours of at most 0.335 deg",
+        "the lobe that the beam sees is 0.671 deg wide",
+        "builtin:sphere-cap",
+    ] {
+        assert!(said[0].contains(words), "{said:?}");
+    }
+    // 20 480 facets turn by 0.0217 rad, and a quarter of them by more.
+    let step_deg = listed[0]["value"].as_f64().unwrap();
+    assert!((1.1..1.6).contains(&step_deg), "{step_deg}");
+    assert_eq!(listed[0]["unit"], "deg");
+
+    // The cap of the same ball, whose facets turn by 0.0025 rad.
+    let size = "size_m = [0.3, 0.3, 0.3]";
+    let cap = ball(0.15, 16).replace("builtin:sphere", "builtin:sphere-cap");
+    assert!(cap.contains(size));
+    let cap = cap.replace(size, "scale = 0.3");
+    assert_eq!(rendered_with(&cap, &sheet(POLISHED, "")), (vec![], vec![]));
+    // A rough lobe of √(m² + δ²) = 0.0514 rad is wide enough for this ball, and one of 0.0232 rad is not.
+    assert_eq!(rendered_with(&ball(0.15, 16), &sheet(LOBE, "")), (vec![], vec![]));
+    let smoother = LOBE.replace("m = 0.05", "m = 0.02");
+    assert_eq!(rendered_with(&ball(0.15, 16), &sheet(&smoother, "")).0.len(), 1);
+    // A mirror that has lost its wave to roughness has no lobe that would count.
+    let rough =
+        r#"model = "kirchhoff", rms_height_m = 1e-3, correlation_length_m = 8e-3, eps_real = 3"#;
+    assert_eq!(rendered_with(&ball(0.15, 16), &sheet(rough, "")), (vec![], vec![]));
+    // Flat plates have no step, and their edges are none.
+    assert_eq!(rendered_with(SCENE, &sheet(POLISHED, "")), (vec![], vec![]));
+}
+
 /// A cap of a ball, 80 mm wide and in facets of half a millimetre, as an OBJ file; its top is the origin.
 fn cap(radius_m: f64) -> String {
     const STEPS: usize = 160;

@@ -122,7 +122,8 @@ fn shown(value: f64) -> String {
 fn trip(scene: &Scene, seed: u64) -> Result<Trip, Failure> {
     let quiet = Radar { speckle: None, noise: None, ..scene.radar().clone() };
     let noise = Noise { level_dbm: Some(-112.0), range_sd_m: RANGE_SD_M, ..Noise::default() };
-    let speckle = Speckle { looks: LOOKS, form: Some(SpeckleForm::Independent) };
+    let speckle =
+        Speckle { looks: LOOKS, form: Some(SpeckleForm::Independent), ..Default::default() };
     let noisy = Radar { speckle: Some(speckle), noise: Some(noise), ..quiet.clone() };
     let mesh = &scene.target.mesh;
     let echoes = rendered(scene, &noisy, mesh, &truth(), seed)?;

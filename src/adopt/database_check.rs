@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use serde::Serialize;
 
-use crate::brdf::Excess;
+use crate::brdf::{BeyondBeam, Excess, VIEWING_RAD};
 use crate::catalogue::{CheckCount, Problem, Refit, StoreCheck};
 use crate::error::Error;
 use crate::material::{Lobes, builtin};
@@ -114,17 +114,30 @@ impl DatabaseCheck {
 /// What tells rendered laws apart: the hash of the model, and the bits of its range of angles.
 type RenderedLaw = (Option<[u8; 16]>, [u64; 2]);
 
-/// Materials of which scenes render a law that reflects more than it receives, a sentence each. What cannot be read is
-/// a finding already.
+/// What is too much of a law.
+#[derive(Clone, Copy, Default)]
+struct TooMuch {
+    excess: Option<Excess>,
+    /// Through the beam of the default radar.
+    beyond: Option<BeyondBeam>,
+}
+
+/// Materials of which scenes render a law that reflects more than it receives, or more than a mirror through the
+/// default radar's beam, a sentence each. What cannot be read is a finding already.
 fn too_much(store: &Store, outlines: &[OutlineEntry]) -> Vec<String> {
-    let mut known: HashMap<RenderedLaw, Option<Excess>> = HashMap::new();
+    let mut known: HashMap<RenderedLaw, TooMuch> = HashMap::new();
     let mut notices = Vec::new();
     for OutlineEntry { slug, model_hash, theta_rad, .. } in outlines {
         let of_law = known.entry((*model_hash, theta_rad.map(f64::to_bits))).or_insert_with(|| {
-            let (law, theta_rad) = store.rendered(&slug.parse().ok()?).ok()??;
-            Excess::of(&law, theta_rad)
+            let rendered = slug.parse().ok().and_then(|wanted| store.rendered(&wanted).ok()?);
+            rendered.map_or_else(TooMuch::default, |(law, theta_rad)| TooMuch {
+                excess: Excess::of(&law, theta_rad),
+                beyond: BeyondBeam::of(&law, VIEWING_RAD),
+            })
         });
-        notices.extend(of_law.map(|excess| format!("the law of `{slug}` {}", excess.words())));
+        let words = of_law.excess.map(|excess| excess.words()).into_iter();
+        let words = words.chain(of_law.beyond.map(|beyond| beyond.words(VIEWING_RAD)));
+        notices.extend(words.map(|words| format!("the law of `{slug}` {words}")));
     }
     notices
 }

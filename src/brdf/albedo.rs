@@ -20,8 +20,8 @@ const GAMMA: f64 = 12.0;
 /// Step between the angles of incidence that are tried, rad, and the largest of them: beyond, no model holds.
 const STEP_RAD: f64 = PI / 9.0;
 const LARGEST_RAD: f64 = 4.0 * STEP_RAD;
-/// What the quadrature and the approximations of shadowing may add.
-const SLACK: f64 = 0.01;
+/// What the quadrature and the approximations of shadowing may add to an albedo.
+pub const ALBEDO_SLACK: f64 = 0.01;
 
 /// A law that reflects more than it receives.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,17 +35,15 @@ pub struct Excess {
 impl Excess {
     /// The largest excess of a law between two angles of incidence, rad; none where it reflects at most what it
     /// receives. A grain lies in the plane of incidence.
-    pub fn of(law: &Brdf, [low_rad, high_rad]: [f64; 2]) -> Option<Excess> {
+    pub fn of(law: &Brdf, range_rad: [f64; 2]) -> Option<Excess> {
         if most(law) <= 1.0 {
             return None;
         }
-        let high_rad = high_rad.min(LARGEST_RAD);
-        let mut angles: Vec<f64> = (0..4).map(|step| f64::from(step) * STEP_RAD).collect();
-        angles.retain(|theta_rad| *theta_rad > low_rad && *theta_rad < high_rad);
-        angles.extend([low_rad.min(high_rad), high_rad]);
+        let angles = incidences_rad(range_rad);
         let albedos: Vec<f64> =
             angles.par_iter().map(|theta_rad| albedo(law, *theta_rad)).collect();
-        let found = std::iter::zip(angles, albedos).filter(|(_, albedo)| *albedo > 1.0 + SLACK);
+        let found =
+            std::iter::zip(angles, albedos).filter(|(_, albedo)| *albedo > 1.0 + ALBEDO_SLACK);
         let largest = found.max_by(|a, b| a.1.total_cmp(&b.1));
         largest.map(|(theta_rad, albedo)| Excess { theta_rad, albedo })
     }
@@ -59,6 +57,15 @@ impl Excess {
             100.0 * (self.albedo - 1.0)
         )
     }
+}
+
+/// The incidences between two angles, rad, at which energy is checked: both ends and every 20° between, up to 80°.
+pub fn incidences_rad([low_rad, high_rad]: [f64; 2]) -> Vec<f64> {
+    let high_rad = high_rad.min(LARGEST_RAD);
+    let mut angles: Vec<f64> = (0..4).map(|step| f64::from(step) * STEP_RAD).collect();
+    angles.retain(|theta_rad| *theta_rad > low_rad && *theta_rad < high_rad);
+    angles.extend([low_rad.min(high_rad), high_rad]);
+    angles
 }
 
 /// What a law reflects at an incidence, rad, in all directions, over what it receives.

@@ -13,6 +13,7 @@
 
 mod albedo;
 mod backscatter;
+mod beyond_beam;
 mod kind;
 mod models;
 mod outline;
@@ -24,8 +25,9 @@ mod slopes;
 mod through_beam;
 mod validity;
 
-pub use albedo::{Excess, albedo};
+pub use albedo::{ALBEDO_SLACK, Excess, albedo, incidences_rad};
 pub use backscatter::{Facets, Term};
+pub use beyond_beam::BeyondBeam;
 pub use kind::{Key, Kind};
 pub use models::*;
 pub use outline::{DEGREES, Outline};

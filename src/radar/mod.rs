@@ -33,6 +33,6 @@ pub use preset::PRESETS;
 pub use receiver::{Detection, RangeProcessor, Receiver};
 pub use scan::{Chirps, Field, Pattern};
 pub use settings::{BeamEntry, Footprint, Radar, Returns, SpotDiameter};
-pub use speckle::{IndependentSpeckle, Speckle, SpeckleForm};
+pub use speckle::{EarlierSpeckle, IndependentSpeckle, Speckle, SpeckleForm};
 pub use transmitter::{Leakage, PhaseNoise, SweepRipple};
 pub use window::Window;

@@ -9,6 +9,9 @@
 //! The scatterers are fixed to the surface. Chirps whose spots overlap see the same ones, so that their
 //! speckle is alike: `render/speckle` has the forms of that field.
 
+use std::fmt;
+use std::ops::RangeInclusive;
+
 use serde::{Deserialize, Serialize};
 
 use super::error::{RadarError, in_range};
@@ -26,6 +29,38 @@ pub struct Speckle {
     /// receivers elsewhere or several paths in a beat signal, [`SpeckleForm::Law`] for any other.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub form: Option<SpeckleForm>,
+    /// What a file without a `form` states that only 0.1.0 knew; [`form`](Self::form) is then
+    /// [`SpeckleForm::Independent`], the speckle of 0.1.0.
+    #[serde(skip)]
+    pub earlier: Option<EarlierSpeckle>,
+}
+
+/// What says that speckle was written for 0.1.0, which drew it anew for every chirp.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum EarlierSpeckle {
+    /// Looks that are no number of fields: the number.
+    Looks(f64),
+    /// The ratio K of the coherent part to the diffuse one, for the whole scene. Each material has a ratio of its own
+    /// now, and K does nothing.
+    CoherentRatio(f64),
+}
+
+impl fmt::Display for EarlierSpeckle {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            EarlierSpeckle::Looks(looks) => write!(
+                f,
+                "radar.speckle.looks = {looks} is drawn anew for every chirp, as in 0.1.0, since speckle that is fixed to the \
+                 surface has whole looks from 1 to {MOST_FIELDS}; form = \"independent\" states it"
+            ),
+            EarlierSpeckle::CoherentRatio(ratio) => write!(
+                f,
+                "radar.speckle.coherent_ratio = {ratio} is ignored, since each material has a coherent share of its own; \
+                 speckle is drawn anew for every chirp, as in 0.1.0; remove the key, and state form = \"independent\" to keep \
+                 that"
+            ),
+        }
+    }
 }
 
 /// How the speckle of neighbouring chirps is made.
@@ -67,7 +102,7 @@ struct SpeckleEntry {
 
 impl Default for SpeckleEntry {
     fn default() -> Self {
-        let Speckle { looks, form } = Speckle::default();
+        let Speckle { looks, form, .. } = Speckle::default();
         SpeckleEntry { looks, form, coherent_ratio: 0.0 }
     }
 }
@@ -76,19 +111,41 @@ impl TryFrom<SpeckleEntry> for Speckle {
     type Error = &'static str;
 
     fn try_from(entry: SpeckleEntry) -> Result<Speckle, Self::Error> {
-        if entry.coherent_ratio != 0.0 {
+        let SpeckleEntry { looks, form, coherent_ratio } = entry;
+        if !EARLIER_RATIOS.contains(&coherent_ratio) {
             return Err(
-                "coherent_ratio is no longer a key: how much of an echo is coherent follows from the \
+                "coherent_ratio is not a number from 0 to 1e9; it is no longer a key, remove it",
+            );
+        }
+        if form.is_some() && coherent_ratio != 0.0 {
+            return Err(
+                "coherent_ratio is not a key with a form: how much of an echo is coherent follows from the \
                         material, all of a smooth surface's and nothing of a diffuse one's; remove it",
             );
         }
-        Ok(Speckle { looks: entry.looks, form: entry.form })
+        let is_earlier = !is_number_of_fields(looks) && EARLIER_LOOKS.contains(&looks);
+        let earlier = match form {
+            None if coherent_ratio != 0.0 => Some(EarlierSpeckle::CoherentRatio(coherent_ratio)),
+            None if is_earlier => Some(EarlierSpeckle::Looks(looks)),
+            _ => None,
+        };
+        let form = form.or(earlier.map(|_| SpeckleForm::Independent));
+        Ok(Speckle { looks, form, earlier })
     }
+}
+
+/// What 0.1.0 took as looks and as the ratio of the coherent part to the diffuse one.
+const EARLIER_LOOKS: RangeInclusive<f64> = 0.1..=1e6;
+const EARLIER_RATIOS: RangeInclusive<f64> = 0.0..=1e9;
+
+/// Whether looks can be fields of their own.
+fn is_number_of_fields(looks: f64) -> bool {
+    looks.fract() == 0.0 && (1.0..=MOST_FIELDS).contains(&looks)
 }
 
 impl Default for Speckle {
     fn default() -> Self {
-        Speckle { looks: 1.0, form: None }
+        Speckle { looks: 1.0, form: None, earlier: None }
     }
 }
 
@@ -101,7 +158,7 @@ impl Speckle {
         let looks = self.looks;
         match self.form {
             Some(SpeckleForm::Independent) => in_range(("speckle.looks", looks, (0.1, 1e6))),
-            _ if looks.fract() == 0.0 && (1.0..=MOST_FIELDS).contains(&looks) => Ok(()),
+            _ if is_number_of_fields(looks) => Ok(()),
             _ => Err(RadarError::PartOfAField { looks, most: MOST_FIELDS }),
         }
     }
@@ -277,7 +334,7 @@ mod tests {
 
     #[test]
     fn looks_are_fields_unless_they_are_independent() {
-        let of = |looks, form| Speckle { looks, form }.validate();
+        let of = |looks, form| Speckle { looks, form, earlier: None }.validate();
         for form in [None, Some(SpeckleForm::Law), Some(SpeckleForm::Scatterers)] {
             of(4.0, form).unwrap();
             for looks in [0.0, 2.5, 257.0, f64::NAN] {
@@ -295,8 +352,41 @@ mod tests {
     #[test]
     fn the_share_that_was_stated_is_now_the_material_s() {
         let read = |text: &str| toml::from_str::<Speckle>(text);
-        assert_eq!(read("looks = 2\ncoherent_ratio = 0").unwrap().looks, 2.0);
-        let error = read("coherent_ratio = 3").unwrap_err().to_string();
-        assert!(error.contains("follows from the material"), "{error}");
+        let kept = read("looks = 2\ncoherent_ratio = 0").unwrap();
+        assert_eq!(kept, Speckle { looks: 2.0, ..Default::default() });
+        for form in ["law", "scatterers", "independent"] {
+            let error = read(&format!("form = \"{form}\"\ncoherent_ratio = 3")).unwrap_err();
+            assert!(error.to_string().contains("follows from the material"), "{error}");
+        }
+        for ratio in ["-1", "nan", "inf", "1e10"] {
+            let error = read(&format!("coherent_ratio = {ratio}")).unwrap_err().to_string();
+            assert!(error.contains("from 0 to 1e9"), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_table_of_0_1_0_that_has_no_field_is_drawn_anew_and_says_so() {
+        for (text, looks, said) in [
+            ("looks = 2.5", 2.5, "radar.speckle.looks = 2.5 is drawn anew"),
+            ("looks = 1000", 1000.0, "radar.speckle.looks = 1000 is drawn anew"),
+            ("looks = 4\ncoherent_ratio = 3", 4.0, "radar.speckle.coherent_ratio = 3 is ignored"),
+        ] {
+            let speckle: Speckle = toml::from_str(text).unwrap();
+            speckle.validate().unwrap();
+            assert_eq!((speckle.looks, speckle.form), (looks, Some(SpeckleForm::Independent)));
+            let notice = speckle.earlier.unwrap().to_string();
+            assert!(notice.contains(said) && notice.contains("\"independent\""), "{notice}");
+            // What a record keeps of it states the form and needs no notice.
+            let record = toml::to_string(&speckle).unwrap();
+            assert!(record.contains("form = \"independent\"") && !record.contains("coherent"));
+            assert_eq!(toml::from_str::<Speckle>(&record).unwrap().earlier, None);
+        }
+        let whole: Speckle = toml::from_str("looks = 4").unwrap();
+        assert_eq!((whole.form, whole.earlier), (None, None));
+        for text in ["looks = 0", "looks = -2", "looks = nan", "looks = 1e7"] {
+            assert!(toml::from_str::<Speckle>(text).unwrap().validate().is_err(), "{text}");
+        }
+        let stated: Speckle = toml::from_str("looks = 2.5\nform = \"law\"").unwrap();
+        assert!(stated.validate().is_err());
     }
 }

@@ -52,8 +52,8 @@ pub enum RenderError {
     LawOfTones,
     /// The field of the speckle would not fit into memory.
     #[error(
-        "the speckle of this scan is too large a field: its rays aim too far apart for the width of the beam, or \
-         radar.speckle.looks is too large; set radar.speckle.form = \"independent\""
+        "the speckle of this scan is too large a field: its rays aim too far apart for the width of the beam, the \
+         beam widens more than twenty times towards the edge, or radar.speckle.looks is too large; set radar.speckle.form = \"independent\""
     )]
     SpeckleField,
     /// Scatterers are placed as one antenna sees them.
@@ -70,6 +70,30 @@ pub enum RenderError {
     ScattererCount {
         /// Number of scatterers.
         count: usize,
+    },
+    /// The beams pass their foci too far apart for scatterers.
+    #[error(
+        "the beams of this scan pass their foci over {squares:.1e} squares of their waist, and scatterers take {most:.1e} at \
+         most; set radar.beam.focus_m nearer to the target, or radar.speckle.form = \"independent\""
+    )]
+    ScattererField {
+        /// Squares as wide as the waist between the outermost beams.
+        squares: f64,
+        /// The most that there can be.
+        most: f64,
+    },
+    /// Amplitudes of so many scatterers and looks would not fit into memory.
+    #[error(
+        "{scatterers} scatterers of radar.speckle.looks = {looks} have more than {most:.1e} amplitudes; lower looks, or \
+         set radar.speckle.form = \"independent\""
+    )]
+    ScattererLooks {
+        /// Number of scatterers that the radar sees.
+        scatterers: usize,
+        /// Looks.
+        looks: usize,
+        /// The most amplitudes that there can be.
+        most: f64,
     },
     /// A batch does not place scatterers.
     #[error(

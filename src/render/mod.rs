@@ -4,7 +4,7 @@
 //! |---|---|
 //! | intersections of the rays of each chirp with the target | `spot.rs`, equation (7) |
 //! | the surfaces of the target | `surface.rs` |
-//! | what the target lets through | `sheet.rs` |
+//! | what the target lets through | `sheet.rs`, `sheet_energy.rs` |
 //! | power that arrives at an antenna by single paths | `paths.rs`, equation (11) |
 //! | … and by second-order paths | `bounce.rs` |
 //! | … with declared physical effects | `effect_scan.rs` |
@@ -12,6 +12,7 @@
 //! | speckle, a field fixed to the surface | `speckle/` |
 //! | echoes that part in range | `returns.rs` |
 //! | how far the target tilts within the spots | `curvature.rs` |
+//! | how far neighbouring facets turn | `facet_steps.rs` |
 //! | detection by the receiver, and the cause of each echo | `detect.rs`, `echo.rs` |
 //! | tones of a beat signal | `tones.rs` |
 //! | image and point cloud | `image.rs`, `cloud.rs` |
@@ -28,6 +29,7 @@ mod detect;
 mod echo;
 mod edges;
 mod error;
+mod facet_steps;
 mod image;
 mod jones;
 mod observer;
@@ -37,6 +39,7 @@ mod returns;
 mod scan;
 mod setup;
 mod sheet;
+mod sheet_energy;
 mod speckle;
 mod spot;
 mod surface;
@@ -48,11 +51,13 @@ pub use cloud::cloud_table;
 pub use curvature::{SpotTilt, spot_tilts};
 pub use echo::{Echo, Truth};
 pub use error::RenderError;
+pub use facet_steps::facet_steps;
 pub use image::{CHANNELS, power_image};
 pub use observer::Observer;
 pub use scan::{Scan, beat_signals, shade, trace, trace_placed};
 pub use setup::{MOST_SHEETS, Setup};
 pub use sheet::Sheet;
+pub use sheet_energy::SheetGain;
 pub use spot::{Behind, Footprints};
 pub use surface::{Orientation, Surface};
 pub use tones::Beats;

@@ -16,7 +16,7 @@ use nalgebra::Complex;
 
 use super::jones::{Field, Filter};
 use crate::brdf::{
-    Brdf, Layer, Layered, NarrowLobe, Polarisation, Scattering, Seen, mirror_cosine,
+    Brdf, Layer, Layered, NarrowLobe, Polarisation, Scattering, Seen, albedo, mirror_cosine,
 };
 use crate::frames::{Direction, Surface};
 use crate::radar::Radar;
@@ -178,6 +178,18 @@ impl Sheet {
     pub fn reflectance(&self, cos_theta: f64) -> f64 {
         let (row, next, share) = self.rows_at(cos_theta);
         mix(row.reflectance, next.reflectance, share)
+    }
+
+    /// Share of the power that passes one way, unpolarised, as the radar reads it.
+    pub fn transmittance(&self, cos_theta: f64) -> f64 {
+        let (row, next, share) = self.rows_at(cos_theta);
+        mix(0.5 * power(row.transmitted), 0.5 * power(next.transmitted), share)
+    }
+
+    /// Share of the power that returns in all directions at an incidence, rad.
+    pub fn albedo(&self, theta_rad: f64) -> f64 {
+        let others: f64 = self.others.iter().map(|law| albedo(law, theta_rad)).sum();
+        if self.is_mirror { others + self.reflectance(theta_rad.cos()) } else { others }
     }
 
     /// Range of the stack's own echo behind its outer face, m: 0 where the outer face returns most, or where a

@@ -76,7 +76,7 @@ impl Beat {
     fn tones(&self, waves: &mut Waves, paths: &[Path]) -> Vec<Tone> {
         let looks = self.looks as usize;
         match waves.speckle {
-            // Checked before: a single path.
+            // Checked before: a single ray, whose paths part by the sheets in front of them.
             Fluctuation::None => {
                 let tones = paths.iter().map(|path| Tone {
                     range_m: path.range_m,

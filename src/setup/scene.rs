@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::materials::{MaterialRevision, find_material, status_warning};
-use crate::brdf::{Brdf, Excess, ScatteringModel};
+use crate::brdf::{BeyondBeam, Brdf, Excess, ScatteringModel};
 use crate::effects::{EffectList, Level, Model, Receiver, SceneEffects, resolve};
 use crate::error::Error;
 use crate::formats::EffectEntry;
@@ -12,7 +12,7 @@ use crate::frames::{Global, Point, Pose};
 use crate::geometry::Raster;
 use crate::material::{Curve, Lobes, Material};
 use crate::radar::{Beam, Channel, Radar, SpeckleForm};
-use crate::render::{Bounce, RenderError, Scan, Setup, Sheet, Surface, power_image};
+use crate::render::{Bounce, RenderError, Scan, Setup, Sheet, SheetGain, Surface, power_image};
 use crate::scene::{Region, Scene};
 use crate::store::Store;
 use crate::trace::{Bvh, ScanGeometry};
@@ -260,8 +260,9 @@ impl ReadyScene {
         })
     }
 
-    /// Sentences on materials that are withdrawn or superseded, make no claim at the radar's frequency, were reduced
-    /// with another footprint than the scene's, have a narrower lobe than its beam, or reflect more than they receive.
+    /// Sentences on speckle as 0.1.0 had it, on materials that are withdrawn or superseded, make no claim at the radar's
+    /// frequency, were reduced with another footprint than the scene's, have a narrower lobe than its beam, or reflect
+    /// more than they receive or than a mirror, and on sheets with gain.
     pub fn notices(&self) -> Vec<String> {
         let mut notices = Vec::new();
         for SceneMaterial { found, .. } in &self.materials {
@@ -271,6 +272,8 @@ impl ReadyScene {
             notices.extend(extrapolation_warning(&found.material, self.scene.radar()));
             notices.extend(polarisation_warning(&found.material));
         }
+        let earlier = self.scene.radar().speckle.and_then(|speckle| speckle.earlier);
+        notices.extend(earlier.map(|earlier| earlier.to_string()));
         if self.speckle_form() == Some(SpeckleForm::Law) && !self.scene.file.receiver.is_empty() {
             notices.push(INDEPENDENT_ANTENNAS.to_owned());
         }
@@ -278,8 +281,33 @@ impl ReadyScene {
             notices.extend(self.other_footprint(material));
             notices.extend(self.too_narrow(material));
             notices.extend(too_much(material));
+            notices.extend(self.beyond_beam(material));
         }
+        notices.extend(self.gaining_sheets());
         notices
+    }
+
+    /// That a material's curve returns what no surface does through this radar's beam.
+    fn beyond_beam(&self, material: &SceneMaterial) -> Option<String> {
+        let beam_rad = Beam::new(self.scene.radar()).towards(0.0, 0.0).divergence_rad();
+        let beyond = BeyondBeam::of(&material.scattering, beam_rad)?;
+        Some(format!("the law of `{}` {}", material.name, beyond.words(beam_rad)))
+    }
+
+    /// Regions that return and let through more than they receive.
+    fn gaining_sheets(&self) -> Vec<String> {
+        let regions = self.scene.target.regions.iter().zip(&self.sheets);
+        let gaining = regions.zip(self.of_regions()).filter_map(|((region, sheet), material)| {
+            let gain = SheetGain::of(sheet.as_ref()?, material.found.material.theta_rad)?;
+            Some(format!(
+                "the sheet of region `{}`, the law of `{}` with what its permittivity lets through, {}; nothing is cut \
+                 off: give it a law that returns less, or a permittivity that passes less",
+                region.name,
+                material.name,
+                gain.words()
+            ))
+        });
+        gaining.collect()
     }
 
     /// How its speckle is made; none without speckle.
@@ -460,7 +488,6 @@ fn too_much(material: &SceneMaterial) -> Option<String> {
     Some(format!("the law of `{}` {}; nothing is cut off", material.name, excess.words()))
 }
 
-/// That a material makes no claim at the radar's frequency.
 /// A curve that was measured across the polarisation that was sent says nothing of what a scene takes it for.
 fn polarisation_warning(material: &Material) -> Option<String> {
     let curve = material.rendered_curve()?;
@@ -475,6 +502,7 @@ fn polarisation_warning(material: &Material) -> Option<String> {
     })
 }
 
+/// That a material makes no claim at the radar's frequency.
 fn extrapolation_warning(material: &Material, radar: &Radar) -> Option<String> {
     let frequency_ghz = radar.centre_frequency_ghz;
     let outside_ghz = material.frequency_outside_hz(frequency_ghz * 1e9) / 1e9;

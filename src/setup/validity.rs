@@ -5,14 +5,26 @@ use std::fmt;
 use serde::Serialize;
 
 use super::scene::{ReadyScene, SceneMaterial};
-use crate::brdf::{Bound, Brdf, Condition, ScatteringModel};
+use crate::brdf::{Bound, Brdf, Condition, Scattering, ScatteringModel, ThroughBeam};
 use crate::effects::Setting;
 use crate::formats::words::significant;
+use crate::frames::Direction;
 use crate::material::Material;
-use crate::render::{Footprints, Setup, SpotTilt, spot_tilts};
+use crate::radar::Beam;
+use crate::render::{Footprints, Setup, SpotTilt, facet_steps, spot_tilts};
 
 /// Source of the limit of single rays.
 const ONE_RAY: &str = "docs/scattering-models.md, Validity";
+
+/// Source of the limit of facets.
+const FACETS: &str = "docs/scattering-models.md, Validity";
+/// Drop of an echo over the width of a lobe from which on the lobe decides the level, 1 dB: a weak one under a broad
+/// lobe does not.
+const DECIDES: f64 = 0.794;
+
+/// Width of a lobe over the beam's up to which facets are judged, m ≤ √3·δ. A wider lobe is met by several facets of a
+/// spot, whose mean is right: of normals a whole lobe apart it is wrong by 2·exp(−π²), below 0.001 dB.
+const MIRROR_LIKE: f64 = 2.0;
 
 /// A condition that a material of a scene does not meet.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -26,7 +38,7 @@ pub struct ValidityWarning {
     pub condition: Condition,
     /// What to do about it.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub way_out: Option<&'static str>,
+    pub way_out: Option<String>,
 }
 
 /// The conditions of a model, each once, that a surface does not meet at a wavelength, m; `material` is what is known
@@ -63,7 +75,7 @@ impl fmt::Display for ValidityWarning {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let regions = self.regions.join("`, `");
         let sentence = unmet_sentence(&self.condition);
-        let consequence = self.way_out.unwrap_or("what it returns is extrapolated");
+        let consequence = self.way_out.as_deref().unwrap_or("what it returns is extrapolated");
         write!(f, "`{}` on `{regions}`: {sentence}; {consequence}", self.material)
     }
 }
@@ -89,6 +101,47 @@ impl ReadyScene {
             for (number, used) in self.materials.iter().enumerate() {
                 warnings.extend(self.curved_within_spot(number, used, &tilts));
             }
+        }
+        warnings.extend(self.coarse_facets(setup));
+        warnings
+    }
+
+    /// That the facets of regions turn by more than half of a lobe from one to the next.
+    fn coarse_facets(&self, setup: &Setup) -> Vec<ValidityWarning> {
+        let radar = self.scene.radar();
+        let beam_rad = Beam::new(radar).towards(0.0, 0.0).divergence_rad();
+        let lobes = self.materials.iter().map(|used| deciding_lobe_rad(&used.scattering, beam_rad));
+        let lobes: Vec<Option<f64>> = lobes.collect();
+        let lobe_of = |region: usize| lobes[usize::from(self.material_of_region[region])];
+        let steps =
+            facet_steps(setup.geometry.bvh.mesh(), setup.geometry.region_of_facet, |region| {
+                lobe_of(region).is_some()
+            });
+        let mut warnings = Vec::new();
+        for (number, used) in self.materials.iter().enumerate() {
+            let Some(lobe_rad) = lobes[number] else { continue };
+            let of_regions = self.regions_of(number).filter_map(|region| {
+                let step_rad = steps.get(region).copied().flatten()?;
+                Some((region, step_rad)).filter(|(_, step_rad)| *step_rad > 0.5 * lobe_rad)
+            });
+            let coarse: Vec<(usize, f64)> = of_regions.collect();
+            let Some(step_rad) = coarse.iter().map(|(_, rad)| *rad).max_by(f64::total_cmp) else {
+                continue;
+            };
+            warnings.push(ValidityWarning {
+                material: used.name.clone(),
+                regions: coarse.iter().map(|(region, _)| self.region_name(*region)).collect(),
+                condition: Condition {
+                    model: "a mesh of facets",
+                    quantity: "a step between the normals of neighbours",
+                    unit: "deg",
+                    value: step_rad.to_degrees(),
+                    bound: Bound::AtMost,
+                    limit: 0.5 * lobe_rad.to_degrees(),
+                    source: FACETS,
+                },
+                way_out: Some(finer(lobe_rad)),
+            });
         }
         warnings
     }
@@ -119,7 +172,7 @@ impl ReadyScene {
             material: used.name.clone(),
             regions,
             condition: worst?,
-            way_out: Some("set rays = 16 under [spot]"),
+            way_out: Some("set rays = 16 under [spot]".to_owned()),
         })
     }
 
@@ -131,6 +184,27 @@ impl ReadyScene {
     fn region_name(&self, region: usize) -> String {
         self.scene.target.regions[region].name.clone()
     }
+}
+
+/// What to do about facets that step over a lobe.
+fn finer(lobe_rad: f64) -> String {
+    format!(
+        "the lobe that the beam sees is {} deg wide, and the level of glints depends on how the facets lie: give a finer \
+         mesh (builtin:sphere-cap in place of builtin:sphere), or a rougher material",
+        significant(lobe_rad.to_degrees(), 3)
+    )
+}
+
+/// Width of the narrowest lobe of a law as a beam sees it, rad, where it is hardly wider than the beam and the echo
+/// falls with it.
+fn deciding_lobe_rad(law: &Brdf, beam_rad: f64) -> Option<f64> {
+    let lobe_rad = law.lobe_rad(beam_rad)?;
+    let seen = ThroughBeam { law, beam_rad };
+    let [facing, tilted] = [0.0, lobe_rad].map(|theta_rad| {
+        let i = Direction::from_angles(theta_rad, 0.0);
+        seen.f_per_sr(i, i)
+    });
+    (lobe_rad <= MIRROR_LIKE * beam_rad && tilted < DECIDES * facing).then_some(lobe_rad)
 }
 
 /// Whether an effect averages over the spot in place of several rays.

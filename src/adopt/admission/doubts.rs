@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 
+use crate::brdf::{BeyondBeam, VIEWING_RAD};
 use crate::formats::words::counted;
 use crate::material::form::licence_doubt;
 use crate::material::{Censor, Curve, Instrument, Material};
@@ -42,12 +43,19 @@ pub fn doubts(material: &Material) -> Vec<String> {
     for curve in material.curves.iter().filter(|curve| curve.name == material.render) {
         doubts.extend(mostly_missed(curve));
     }
+    doubts.extend(beyond_beam(material));
     let mut licences: Vec<&String> = material.sources.iter().flat_map(|s| &s.licence).collect();
     licences.push(&material.licence);
     licences.sort();
     licences.dedup();
     doubts.extend(licences.into_iter().filter_map(|licence| licence_doubt(licence)));
     doubts.into_iter().map(|doubt| format!("{slug}: {doubt}")).collect()
+}
+
+/// That its rendered curve returns what no surface does through the beam of the default radar.
+fn beyond_beam(material: &Material) -> Option<String> {
+    let beyond = BeyondBeam::of(&material.scattering().ok()?, VIEWING_RAD)?;
+    Some(format!("`{}` {}", material.render, beyond.words(VIEWING_RAD)))
 }
 
 /// That an instrument has the frequency or the threshold of no radar.

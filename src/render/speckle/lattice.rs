@@ -16,9 +16,11 @@ const REACH: f64 = 1.6;
 const NODES_PER_WAIST: f64 = 2.0;
 /// Distances of nodes, m, are whole powers of this, so that a beam of nearly the same waist sees the same noise.
 const SPACINGS: f64 = std::f64::consts::SQRT_2;
+/// Most nodes of the kernel along an axis: a beam at least twenty times as wide as the narrowest one of its scan.
+const MOST_NODES: f64 = 192.0;
 /// Nodes on a side of a block, whose noise has one key.
 const BLOCK: i64 = 32;
-/// Most values of a lattice, 2 GiB.
+/// Most values of the lattices of a scan, 2 GiB.
 const MOST_VALUES: f64 = 134_217_728.0;
 
 /// Where a chirp's beam passes its focus, in the target frame, m, and its waist there, m.
@@ -39,11 +41,25 @@ pub(super) struct Lattice {
     values: Vec<Complex<f64>>,
 }
 
-impl Lattice {
-    /// The lattice under all aims; `None` where it would be larger than memory should hold.
-    pub fn new(aims: &[Aim], identity: Identity, looks: usize) -> Option<Lattice> {
-        let least_m = aims.iter().map(|aim| aim.waist_m).fold(f64::INFINITY, f64::min);
+/// The nodes of a lattice under some aims.
+struct Extent {
+    spacing_m: f64,
+    /// First and last node along each axis.
+    ends: [[f64; 2]; 2],
+    /// Number of nodes along each axis.
+    sides: [f64; 2],
+}
+
+impl Extent {
+    /// `None` where beams are so unlike that a kernel has more nodes than one holds.
+    fn of(aims: &[Aim]) -> Option<Extent> {
+        let waists_m = aims.iter().map(|aim| aim.waist_m);
+        let least_m = waists_m.clone().fold(f64::INFINITY, f64::min);
         let spacing_m = SPACINGS.powf((least_m / NODES_PER_WAIST).log(SPACINGS).floor());
+        let widest_nodes = 2.0 * REACH * waists_m.fold(0.0, f64::max) / spacing_m + 1.0;
+        if widest_nodes.is_nan() || widest_nodes > MOST_NODES {
+            return None;
+        }
         let mut ends = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
         for Aim { at_m, waist_m } in aims {
             for (end, at_m) in ends.iter_mut().zip(at_m) {
@@ -52,12 +68,26 @@ impl Lattice {
                 *end = [end[0].min(low), end[1].max(high + 1.0)];
             }
         }
-        let sides = ends.map(|[low, high]| high - low + 1.0);
-        let values = sides[0] * sides[1] * looks as f64;
-        // Also a side that is no number is too large.
-        if values.is_nan() || values > MOST_VALUES {
-            return None;
-        }
+        Some(Extent { spacing_m, ends, sides: ends.map(|[low, high]| high - low + 1.0) })
+    }
+
+    /// Whether so many values per node are no more than memory should hold. A side that is no number is too large.
+    fn fits(&self, values_per_node: f64) -> bool {
+        self.sides[0] * self.sides[1] * values_per_node <= MOST_VALUES
+    }
+}
+
+impl Lattice {
+    /// Whether memory should hold so many lattices under all aims at once.
+    pub fn fits(aims: &[Aim], looks: usize, layers: usize) -> bool {
+        Extent::of(aims).is_some_and(|extent| extent.fits(looks as f64 * layers as f64))
+    }
+
+    /// The lattice under all aims; `None` where it would be larger than memory should hold, or where the widest beam is
+    /// more than some twenty times as wide as the narrowest.
+    pub fn new(aims: &[Aim], identity: Identity, looks: usize) -> Option<Lattice> {
+        let extent = Extent::of(aims).filter(|extent| extent.fits(looks as f64))?;
+        let Extent { spacing_m, ends, sides } = extent;
         let (first, size) = (ends.map(|end| end[0] as i64), sides.map(|side| side as usize));
         let mut lattice = Lattice { spacing_m, first, size, looks, values: Vec::new() };
         lattice.fill(identity);
@@ -205,5 +235,20 @@ mod tests {
     fn a_lattice_beyond_memory_is_none() {
         assert!(Lattice::new(&[aim(0.0, 0.0), aim(1e4, 1e4)], identity(1), 1).is_none());
         assert!(Lattice::new(&[aim(0.0, 0.0), aim(1e300, 0.0)], identity(1), 1).is_none());
+        // 11 thousand nodes squared are within the bound once and above it twice.
+        let aims = [aim(0.0, 0.0), aim(70.0, 70.0)];
+        assert!(Lattice::fits(&aims, 1, 1) && !Lattice::fits(&aims, 1, 2));
+        assert!(!Lattice::fits(&aims, 2, 1) && !Lattice::fits(&aims, 1, usize::MAX));
+    }
+
+    #[test]
+    fn beams_that_a_kernel_would_cut_off_are_none() {
+        let of = |ratio: f64| {
+            let wide = Aim { at_m: [0.0; 2], waist_m: ratio * WAIST_M };
+            Lattice::new(&[aim(0.0, 0.0), wide], identity(1), 1)
+        };
+        assert!(of(19.0).is_some());
+        assert!(of(25.0).is_none());
+        assert!(of(f64::NAN).is_none() || of(f64::INFINITY).is_none());
     }
 }

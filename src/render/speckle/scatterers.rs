@@ -31,6 +31,10 @@ const PER_WAIST: f64 = 3.0;
 const REACH: f64 = 1.6;
 /// Most scatterers of a scene, which take some 3 GiB.
 const MOST: usize = 50_000_000;
+/// Most squares of the view, which take 1 GiB.
+const MOST_SQUARES: f64 = 134_217_728.0;
+/// Most amplitudes, one per scatterer and look, which take 2 GiB.
+const MOST_AMPLITUDES: f64 = 134_217_728.0;
 /// Numbers whose amplitudes have one key.
 const BLOCK: usize = 1024;
 
@@ -69,11 +73,18 @@ struct View {
     target_from_global: Pose<Target, Global>,
 }
 
-/// Squares of the view, and the scatterers in each.
-struct Grid {
+/// Squares of the view, from its lower left corner.
+#[derive(Clone, Copy)]
+struct Squares {
     low: DVec2,
     side_m: f64,
+    /// Columns and rows.
     size: [usize; 2],
+}
+
+/// Squares of the view, and the scatterers in each.
+struct Grid {
+    squares: Squares,
     /// First scatterer of every square, and the end.
     starts: Vec<usize>,
 }
@@ -89,6 +100,9 @@ impl View {
 
 impl<'a> Scatterers<'a> {
     /// Places scatterers on the target, and keeps those that the radar and the antenna see.
+    ///
+    /// # Errors
+    /// Rays from several places, or more scatterers, squares or amplitudes than memory should hold.
     pub fn new(
         setup: &'a Setup<'a>,
         observer: Observer,
@@ -117,13 +131,20 @@ impl<'a> Scatterers<'a> {
         let beam = Beam::new(radar);
         let identity = Identity::of(setup, |vertex| vertex, [0, 0]);
         let (low, high) = seen_field(&beam, &view, axes);
+        let size = Grid::size(low, high, waist_m)
+            .map_err(|squares| RenderError::ScattererField { squares, most: MOST_SQUARES })?;
         let sites = placement.sites(identity, |site| {
             let at = view.place_m(site.point);
             at.cmpge(low).all() && at.cmple(high).all()
         });
         let eye = Eye { setup, origin, antenna, beam_rad: radar.wavelength_m() / (TAU * waist_m) };
-        let seen = sites.par_iter().filter_map(|site| eye.scatterer(site)).collect();
-        let (grid, scatterers) = Grid::new(&view, [low, high], waist_m, seen);
+        let seen: Vec<_> = sites.par_iter().filter_map(|site| eye.scatterer(site)).collect();
+        let amplitudes = seen.len() as f64 * looks as f64;
+        if amplitudes > MOST_AMPLITUDES {
+            let scatterers = seen.len();
+            return Err(RenderError::ScattererLooks { scatterers, looks, most: MOST_AMPLITUDES });
+        }
+        let (grid, scatterers) = Grid::new(&view, Squares { low, side_m: waist_m, size }, seen);
         let phasors = phasors(identity, &scatterers, looks);
         Ok(Scatterers { axes, beam, antenna, scatterers, looks, phasors, identity, view, grid })
     }
@@ -285,30 +306,7 @@ impl Eye<'_> {
     }
 }
 
-impl Grid {
-    /// Sorts scatterers into squares as wide as the waist.
-    fn new(
-        view: &View,
-        [low, high]: [DVec2; 2],
-        side_m: f64,
-        scatterers: Vec<Scatterer>,
-    ) -> (Grid, Vec<Scatterer>) {
-        let sides = ((high - low) / side_m).max(DVec2::ZERO);
-        let size = [sides.x as usize + 1, sides.y as usize + 1];
-        let mut grid = Grid { low, side_m, size, starts: Vec::new() };
-        let mut keyed: Vec<(usize, Scatterer)> = scatterers
-            .into_par_iter()
-            .map(|scatterer| (grid.square(view.place_m(scatterer.point)), scatterer))
-            .collect();
-        keyed.par_sort_unstable_by_key(|(square, scatterer)| (*square, scatterer.number));
-        grid.starts = vec![0; size[0] * size[1] + 1];
-        keyed.iter().for_each(|(square, _)| grid.starts[square + 1] += 1);
-        for square in 1..grid.starts.len() {
-            grid.starts[square] += grid.starts[square - 1];
-        }
-        (grid, keyed.into_iter().map(|(_, scatterer)| scatterer).collect())
-    }
-
+impl Squares {
     /// Column and row of a place, within the grid.
     fn cell(&self, at: DVec2) -> [usize; 2] {
         let at = ((at - self.low) / self.side_m).max(DVec2::ZERO);
@@ -319,12 +317,42 @@ impl Grid {
         let [column, row] = self.cell(at);
         row * self.size[0] + column
     }
+}
+
+impl Grid {
+    /// Columns and rows of squares of a side between two corners; their number where it is more than memory should hold.
+    fn size(low: DVec2, high: DVec2, side_m: f64) -> Result<[usize; 2], f64> {
+        // Without a chirp both corners are infinite, and one square remains.
+        let sides = ((high - low) / side_m).max(DVec2::ZERO).floor() + 1.0;
+        let squares = sides.x * sides.y;
+        // Also what is no number is too large.
+        if squares.is_nan() || squares > MOST_SQUARES {
+            return Err(squares);
+        }
+        Ok([sides.x as usize, sides.y as usize])
+    }
+
+    /// Sorts scatterers into squares.
+    fn new(view: &View, squares: Squares, scatterers: Vec<Scatterer>) -> (Grid, Vec<Scatterer>) {
+        let mut keyed: Vec<(usize, Scatterer)> = scatterers
+            .into_par_iter()
+            .map(|scatterer| (squares.square(view.place_m(scatterer.point)), scatterer))
+            .collect();
+        keyed.par_sort_unstable_by_key(|(square, scatterer)| (*square, scatterer.number));
+        let mut starts = vec![0; squares.size[0] * squares.size[1] + 1];
+        keyed.iter().for_each(|(square, _)| starts[square + 1] += 1);
+        for square in 1..starts.len() {
+            starts[square] += starts[square - 1];
+        }
+        let scatterers = keyed.into_iter().map(|(_, scatterer)| scatterer).collect();
+        (Grid { squares, starts }, scatterers)
+    }
 
     /// The scatterers of the squares within a distance, row by row.
     fn near(&self, at: DVec2, reach_m: f64) -> impl Iterator<Item = std::ops::Range<usize>> {
-        let [low, high] = [self.cell(at - reach_m), self.cell(at + reach_m)];
+        let [low, high] = [at - reach_m, at + reach_m].map(|at| self.squares.cell(at));
         (low[1]..=high[1]).map(move |row| {
-            let start = row * self.size[0];
+            let start = row * self.squares.size[0];
             self.starts[start + low[0]]..self.starts[start + high[0] + 1]
         })
     }

@@ -102,12 +102,17 @@ fn outside_image(counts: Counts) -> Option<String> {
     })
 }
 
+/// What rounding and the search for a peak may add to a mirror that returns all, dB.
+const SLACK_DB: f64 = 0.05;
+
+/// That the radar receives more than P_t·L, which is what a facing mirror returns.
 fn too_strong(radar: &Radar, power_dbm: PowerRange) -> Option<String> {
     let PowerRange { strongest, .. } = power_dbm;
-    (strongest > radar.transmit_power_dbm).then(|| {
+    let most_dbm = radar.transmit_power_dbm - radar.system_loss_db;
+    (strongest > most_dbm + SLACK_DB).then(|| {
         format!(
-            "the strongest detection, {strongest:.1} dBm, exceeds the transmitted power; the \
-             target is too near or too bright for the power balance to hold"
+            "the strongest detection, {strongest:.1} dBm, exceeds the {most_dbm:.1} dBm that were sent less system_loss_db; \
+             a law returns too much, speckle or noise adds, or aperture_m2 is larger than the beam's"
         )
     })
 }
