@@ -190,7 +190,7 @@ fn contrast(material: &str, form: SpeckleForm, rays: usize) -> f64 {
     let radar = Radar {
         scan: Pattern::Raster(one),
         threshold_dbm: -300.0,
-        speckle: Some(Speckle { looks: 1.0, form: Some(form) }),
+        speckle: Some(Speckle { looks: 1.0, form: Some(form), ..Speckle::default() }),
         ..Radar::default()
     };
     let mut mesh = solids::plate(0.3, 0.3);
