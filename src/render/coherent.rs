@@ -14,7 +14,7 @@ use crate::geometry::Mesh;
 
 /// Smallest cosine between the normals of neighbours of one piece, of 30°: curved surfaces have facets, and edges are
 /// sharper.
-const SMOOTH: f64 = 0.866;
+pub(super) const SMOOTH: f64 = 0.866;
 /// Rays of a piece that rays beside it are compared with.
 const COMPARED: usize = 64;
 

@@ -6,10 +6,9 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::coherent::SMOOTH;
 use crate::geometry::Mesh;
 
-/// Smallest cosine between the normals of neighbours on one smooth surface, of 30°: larger steps are edges.
-const SMOOTH: f64 = 0.866;
 /// About as many sides of facets are compared; of larger meshes these are an even sample.
 const COMPARED: usize = 1 << 16;
 /// Share of the area that may turn by more than the reported step: creases and small parts count little.

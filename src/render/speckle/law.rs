@@ -30,6 +30,9 @@ impl Law {
     ) -> Result<Law, RenderError> {
         let radar = setup.geometry.radar;
         let aims = aims(radar, setup.geometry.chirps);
+        if !Lattice::fits(&aims, looks, layers) {
+            return Err(RenderError::SpeckleField);
+        }
         // The field lies across the beams and not on the mesh: it must be another one as soon as either moves.
         let target_from_global = radar.frames().global_from_target.inverse();
         let seen = |vertex| target_from_global * (target * vertex);

@@ -19,9 +19,7 @@ use super::setup::Setup;
 use super::spot::Footprints;
 use crate::frames::Pose;
 use crate::radar::SpeckleForm;
-use aims::aims;
 pub(super) use cell::{Cell, EVERYWHERE};
-use lattice::Lattice;
 pub(super) use law::Law;
 pub(super) use scatterers::Scatterers;
 
@@ -61,10 +59,6 @@ impl<'a> Field<'a> {
             }
             SpeckleForm::Law | SpeckleForm::Independent => {
                 let layers = 1 + footprints.behind.len();
-                if !Lattice::fits(&aims(setup.geometry.radar, setup.geometry.chirps), looks, layers)
-                {
-                    return Err(RenderError::SpeckleField);
-                }
                 Ok(Field::Law(Law::new(setup, observer, layers, Pose::NONE, looks)?))
             }
         }
