@@ -35,7 +35,7 @@ const PITCH: [f64; 2] = [4.5, 3.0];
 const SIGMAS: f64 = 4.0;
 
 /// Seeds of a single chirp.
-const CHIRP_SEEDS: u64 = 1000;
+const CHIRP_SEEDS: u64 = 4000;
 
 /// The phase of a beam turns by λ/(8·z_R), 0.012°, where the target moves by λ/8.
 const TURN_DEG: f64 = 0.02;
@@ -346,7 +346,7 @@ pub fn tables() -> Vec<Table> {
                 it intensities share ρ = exp(−2d²/w₀²) of their variance, and nothing where each chirp draws its own. The tolerance is \
                 four standard errors, √((1 + 4ρ − 3ρ² + 2ρ³)/n) for n pairs of exponential intensities; that the beams turn about \
                 the reflector takes at most 0.002.";
-    let contrasts = "One chirp, one look, 1000 seeds, by the library: standard deviation of the power over its mean, at plates that face \
+    let contrasts = "One chirp, one look, 4000 seeds, by the library: standard deviation of the power over its mean, at plates that face \
                      the radar. A mirror does not speckle. Paint does, but for the 5 % of its lobe that are coherent, which take \
                      0.1 % off its contrast. The standard error is 0.03; the seeds are fixed.";
     let looks = "L looks, 759 chirps 3 w₀ and more apart, five seeds: L times the variance over the squared mean, which is 1. The tolerance is four \

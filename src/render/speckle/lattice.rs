@@ -132,12 +132,13 @@ impl Lattice {
         amplitudes.clear();
         amplitudes.resize(self.looks, Complex::ZERO);
         let [across, along] = [0, 1].map(|axis| self.weights(aim, axis));
-        for (row, y_weight) in (along.first..).zip(&along.values) {
-            let start = (row * self.size[0] + across.first) * self.looks;
-            let nodes = self.values[start..].chunks_exact(self.looks);
-            for (x_weight, node) in across.values.iter().zip(nodes) {
-                let weight = x_weight * y_weight;
-                amplitudes.iter_mut().zip(node).for_each(|(sum, value)| *sum += weight * value);
+        for (look, sum) in amplitudes.iter_mut().enumerate() {
+            for (row, y_weight) in (along.first..).zip(&along.values) {
+                let start = (row * self.size[0] + across.first) * self.looks + look;
+                let nodes = self.values[start..].iter().step_by(self.looks);
+                let of_row: Complex<f64> =
+                    across.values.iter().zip(nodes).map(|(weight, node)| weight * node).sum();
+                *sum += y_weight * of_row;
             }
         }
         let norm = 1.0 / (across.square_sum() * along.square_sum()).sqrt();
