@@ -68,7 +68,7 @@ fn db(ratio: f64) -> f64 {
 /// Power received from a mesh about the origin over that sent, for a chirp along the axis of the field of view; the
 /// mesh is turned about y and moved away from the focus.
 fn returned(mesh: Mesh, tilt_rad: f64, z_m: f64, rays: usize, law: &dyn Scattering) -> f64 {
-    returned_by(mesh, tilt_rad, z_m, rays, law, None)
+    returned_by(mesh, tilt_rad, z_m, rays, law, None, Observer::Radar)
 }
 
 /// As [`returned`], with second-order paths.
@@ -79,6 +79,7 @@ fn returned_by(
     rays: usize,
     law: &dyn Scattering,
     bounce: Option<Bounce>,
+    observer: Observer,
 ) -> f64 {
     let turn = DMat3::from_rotation_y(tilt_rad);
     for vertex in &mut mesh.vertices {
@@ -95,7 +96,7 @@ fn returned_by(
         ..Radar::default()
     };
     let chirps = Chirps::draw(&radar, |_| Err("no file".to_owned())).unwrap();
-    let echoes = support::echoes_at(&radar, &chirps, &mesh, law, rays, bounce, Observer::Radar);
+    let echoes = support::echoes_at(&radar, &chirps, &mesh, law, rays, bounce, observer);
     echoes.first().map_or(0.0, |echo| echo.power_w)
 }
 
@@ -274,6 +275,20 @@ fn corner(aside_m: f64) -> Mesh {
     Mesh { vertices: vec![a, b, c, d, e, f], facets, labels: Vec::new() }
 }
 
+#[test]
+fn a_corner_sends_power_back_and_not_to_a_receiver_elsewhere() {
+    use matdb::frames::Point;
+    let bounce = Some(Bounce { rays: 400, outside_spot: 0.0, in_phase: false });
+    let at = |x_m: f64| {
+        let position = Point::new(x_m, 1.1, 8.0);
+        let observer = Observer::Receiver { number: 1, position, aperture_m2: None };
+        returned_by(corner(0.02), 0.0, 0.0, 1, &facets(0.03), bounce, observer)
+    };
+    // In the same place it receives as the radar does; 14 deg aside, three widths 2√2·m of what two lobes make, little is left.
+    let beside_db = db(at(2.0) / at(0.0));
+    assert!(at(0.0) > 0.0 && beside_db < -20.0, "{beside_db} dB");
+}
+
 /// How a corner of two mirrors answers a chirp: by no single path, but by two mirrors in turn.
 #[test]
 fn a_corner_of_two_mirrors_returns_what_a_mirror_does() {
@@ -297,7 +312,8 @@ fn a_corner_of_two_mirrors_returns_what_a_mirror_does() {
                 {
                     // A single ray needs the edge beside it.
                     let aside_m = if rays == 1 { aside_m.max(1e-5) } else { aside_m };
-                    let found = returned_by(corner(aside_m), 0.0, z_m, rays, &law, bounce);
+                    let found =
+                        returned_by(corner(aside_m), 0.0, z_m, rays, &law, bounce, Observer::Radar);
                     let error_db = db(found / share);
                     assert!(
                         error_db.abs() < tolerance_db,

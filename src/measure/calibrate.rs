@@ -84,6 +84,10 @@ const LEAST_POINTS: usize = 8;
 const LEAST_SPAN_DB: f64 = 6.0;
 /// The strongest point may lie so far from where the scene has the target, m.
 const FARTHEST_M: f64 = 0.1;
+/// Standard deviation of a loss, dB, above which it is not determined.
+const MOST_LOSS_SD_DB: f64 = 3.0;
+/// Standard deviation of a waist over the waist above which it is not determined.
+const MOST_WAIST_SD: f64 = 0.5;
 /// A return that scatters more than this about its closed form is not that target's, dB.
 const MOST_RMS_DB: f64 = 3.0;
 /// Nor is one whose beam is this many times wider or narrower than the scene's.
@@ -141,7 +145,12 @@ impl Calibration {
         let fit = Fit { view, shots: &shots, lossless_dbm, within_db };
         let fitted = fit.run(&strongest)?;
         fit.check(&fitted, beams, chirps, cloud)?;
-        Ok(fit.result(&fitted, &strongest, 2.0 * radar.spot_fwhm_m()))
+        let result = fit.result(&fitted, &strongest, 2.0 * radar.spot_fwhm_m());
+        let (loss_sd_db, waist) = (result.system_loss_db.sd, result.waist_ratio);
+        let is_determined =
+            loss_sd_db <= MOST_LOSS_SD_DB && waist.sd <= MOST_WAIST_SD * waist.value;
+        let target = shape.name();
+        is_determined.then_some(result).ok_or(CalibrationError::Undetermined { target })
     }
 }
 
@@ -406,7 +415,10 @@ impl Fit<'_> {
     ) -> Result<(), CalibrationError> {
         let (unknowns, target) = (&fitted.unknowns, self.view.shape.name());
         let rms_db = self.rms_db(fitted);
-        if rms_db.is_nan() || rms_db > MOST_RMS_DB {
+        if rms_db.is_nan() {
+            return Err(CalibrationError::Undetermined { target });
+        }
+        if rms_db > MOST_RMS_DB {
             return Err(CalibrationError::OtherReturn { target, rms_db });
         }
         let ratio = unknowns[3].exp();
@@ -747,6 +759,14 @@ mod tests {
         let points = cloud.points().iter().copied().step_by(2);
         let half = Cloud::new(points.collect()).unwrap();
         assert!(text(&sphere, &radar, &half).contains("chirps near the peak"));
+        // One point over and over.
+        let one = CloudPoint { chirp: None, ..cloud.points()[cloud.points().len() / 2] };
+        let same = Cloud::new(vec![one; 100]).unwrap();
+        let undetermined = run(&sphere, &radar, &chirps, &same);
+        assert!(
+            matches!(undetermined, Err(CalibrationError::Undetermined { .. })),
+            "{undetermined:?}"
+        );
         // A corner that is turned away.
         let ReferenceShape::Corner { apex, legs } = corner else { panic!() };
         let away = ReferenceShape::Corner { apex, legs: legs.map(|leg| -leg) };

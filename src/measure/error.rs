@@ -208,6 +208,15 @@ pub enum CalibrationError {
         /// Root mean square of the residuals, dB.
         rms_db: f64,
     },
+    /// The powers do not tell loss and beam apart.
+    #[error(
+        "the points determine neither the loss nor the beam; scan the {target} with points all around its peak, from directions \
+         that differ by less than the spot"
+    )]
+    Undetermined {
+        /// What the target is.
+        target: &'static str,
+    },
     /// The powers fall off as no beam of this radar makes them.
     #[error(
         "as the return of a {target} the powers need a beam {ratio:.2} times as wide as the radar's; is it another target, \

@@ -59,21 +59,26 @@ impl Arrival {
         if let [path] = paths {
             return Arrival::of_one_piece(mean, path.power_w * path.coherent_share);
         }
-        let waves = waves(paths);
+        let waves = waves_by_surfaces(paths);
         if let [] | [_] = waves[..] {
-            let coherent_w = waves.first().map_or(0.0, |wave| wave.power_w);
+            let coherent_w = waves.first().map_or(0.0, |(_, wave)| wave.power_w);
             return Arrival::of_one_piece(mean, coherent_w);
         }
-        let coherent: Complex<f64> = waves
-            .iter()
-            .map(|wave| {
-                let phase_rad = 2.0 * TAU / wavelength_m * (wave.range_m - mean.range_m);
-                Complex::from_polar(wave.power_w.sqrt(), phase_rad)
-            })
-            .sum();
-        let coherent_w: f64 = waves.iter().map(|wave| wave.power_w).sum();
+        // Between sheets waves go to and fro, which no path follows: there powers add, so that no more returns than was sent.
+        let mut layers: Vec<(u8, Complex<f64>)> = Vec::new();
+        for ((_, _, sheets), wave) in &waves {
+            let phase_rad = 2.0 * TAU / wavelength_m * (wave.range_m - mean.range_m);
+            let amplitude = Complex::from_polar(wave.power_w.sqrt(), phase_rad);
+            match layers.iter_mut().find(|(other, _)| other == sheets) {
+                Some((_, sum)) => *sum += amplitude,
+                None => layers.push((*sheets, amplitude)),
+            }
+        }
+        let coherent: Complex<f64> = layers.iter().map(|(_, amplitude)| amplitude).sum();
+        let of_layers_w: f64 = layers.iter().map(|(_, amplitude)| amplitude.norm_sqr()).sum();
+        let coherent_w: f64 = waves.iter().map(|(_, wave)| wave.power_w).sum();
         let incoherent_w = (mean.power_w - coherent_w).max(0.0);
-        mean.power_w = coherent.norm_sqr() + incoherent_w;
+        mean.power_w = of_layers_w + incoherent_w;
         Arrival { mean, incoherent_w, coherent }
     }
 
@@ -85,6 +90,10 @@ impl Arrival {
 
 /// The waves of some paths: the coherent parts of those by way of the same smooth pieces, with their mean range.
 pub(super) fn waves(paths: &[Path]) -> Vec<Detection> {
+    waves_by_surfaces(paths).into_iter().map(|(_, wave)| wave).collect()
+}
+
+fn waves_by_surfaces(paths: &[Path]) -> Vec<(Surfaces, Detection)> {
     let mut pieces: Vec<(Surfaces, Detection)> = Vec::new();
     for path in paths {
         let power_w = path.power_w * path.coherent_share;
@@ -101,7 +110,7 @@ pub(super) fn waves(paths: &[Path]) -> Vec<Detection> {
         // The mean by small steps keeps the precision of a range.
         wave.range_m += (path.range_m - wave.range_m) * (power_w / wave.power_w);
     }
-    pieces.into_iter().map(|(_, wave)| wave).collect()
+    pieces
 }
 
 /// The surfaces that a path goes by, as far as they tell waves apart.

@@ -379,7 +379,8 @@ impl<'a> Emission<'a> {
             };
             let pattern = self.pattern(bounce, &hit);
             let to_first = -lit.frame.world(direction.xyz());
-            let in_main_lobe = pattern > bounce.outside_spot;
+            let in_main_lobe =
+                self.paths.observer == Observer::Radar && pattern > bounce.outside_spot;
             let mut second = self.lit_by_surface(hit, to_first, in_main_lobe);
             // The beam's width counts once, here: exp(−ε²/4δ²) for the angle ε to its wavefront.
             let beam_rad = second.beam_rad;

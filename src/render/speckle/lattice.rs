@@ -237,7 +237,7 @@ mod tests {
         assert!(Lattice::new(&[aim(0.0, 0.0), aim(1e4, 1e4)], identity(1), 1).is_none());
         assert!(Lattice::new(&[aim(0.0, 0.0), aim(1e300, 0.0)], identity(1), 1).is_none());
         // 11 thousand nodes squared are within the bound once and above it twice.
-        let aims = [aim(0.0, 0.0), aim(70.0, 70.0)];
+        let aims = [aim(0.0, 0.0), aim(60.0, 60.0)];
         assert!(Lattice::fits(&aims, 1, 1) && !Lattice::fits(&aims, 1, 2));
         assert!(!Lattice::fits(&aims, 2, 1) && !Lattice::fits(&aims, 1, usize::MAX));
     }
