@@ -31,12 +31,12 @@ def cap_mesh(centre, radius, fine=0.003, coarse=0.010, azimuths=180):
 
 
 def tube_mesh(p0, p1, radius, step=0.0025):
-    """The side of a cylinder from p0 to p1 that faces +z."""
+    """The side of a cylinder from p0 to p1."""
     axis = (p1 - p0) / np.linalg.norm(p1 - p0)
     front = np.array([0, 0, 1.0]) - axis * axis[2]
     front /= np.linalg.norm(front)
     side = np.cross(axis, front)
-    phi = np.arange(-1.7, 1.7, step)
+    phi = np.linspace(-np.pi, np.pi, int(2 * np.pi / step))  # open at both ends, as Mitsuba's is: rays meet its inside
     ring = radius * (np.cos(phi)[:, None] * front + np.sin(phi)[:, None] * side)
     return np.concatenate([p0 + ring, p1 + ring]), grid_faces(2, len(phi))
 
@@ -149,5 +149,5 @@ MATERIALS = {
     # eta = 1.5: Mitsuba's own Fresnel and its transmitted diffuse part, which no number below states exactly
     "body": dict(kind="plastic", distribution="beckmann", m=0.16, eta=1.5, r=0.0016, f=0.04, k=0.5, footprint="projected"),
     "groove": dict(kind="blend", distribution="ggx", m=0.14, f=0.08, k=0.15, r=0.014, footprint="paper"),
-    "vase": dict(kind="blend", distribution="beckmann", m=0.45, f=0.04, k=0.20, r=0.004, footprint="projected"),
+    "vase": dict(kind="blend", distribution="ggx", m=0.45, f=0.04, k=0.20, r=0.002, footprint="projected"),
 }
