@@ -1,5 +1,6 @@
 """Build the six bases with Mitsuba 3: its rays, its shapes, its BSDFs. Writes bases/NAME.npz."""
 
+import functools
 import os
 import sys
 import tempfile
@@ -64,13 +65,13 @@ def backscatter(b, theta):
     return float(b.eval(mi.BSDFContext(), si, si.wi)[0]) / np.cos(theta)
 
 
-def trace(scene, order, directions, evaluate):
+def trace(scene, order, origins, directions, evaluate):
     """Range, incidence normal, piece, facet and f cos(theta) of the first hit of each ray; range 0 where none."""
     n = len(directions)
     out = dict(range=np.zeros(n), normal=np.zeros((n, 3)), piece=np.full(n, -1), facet=np.full(n, -1), fcos=np.zeros(n))
     context = mi.BSDFContext()
-    for i, d in enumerate(directions):
-        si = scene.ray_intersect(mi.Ray3f(list(scan.ORIGIN), list(d)))
+    for i, (o, d) in enumerate(zip(np.broadcast_to(origins, (n, 3)), directions)):
+        si = scene.ray_intersect(mi.Ray3f(list(o), list(d)))
         if not si.is_valid():
             continue
         normal = np.array(si.n)
@@ -85,19 +86,26 @@ def trace(scene, order, directions, evaluate):
     return out
 
 
-def build(name, folder):
-    material = targets.MATERIALS[name]
+@functools.lru_cache
+def load(name):
+    """Mitsuba's scene of a target, and the number of each of its shapes."""
     record = {"type": "scene"}
-    for number, shape in enumerate(shapes(name, folder)):
-        inner = bsdf(material, "all")
-        record[f"s{number}"] = {**shape, "bsdf": {"type": "twosided", "inner": inner}}
-    scene = mi.load_dict(record, optimize=False)  # merged meshes have no names
-    order = {f"s{i}": i for i in range(len(record) - 1)}
+    inner = bsdf(targets.MATERIALS[name], "all")
+    with tempfile.TemporaryDirectory() as folder:
+        for number, shape in enumerate(shapes(name, folder)):
+            record[f"s{number}"] = {**shape, "bsdf": {"type": "twosided", "inner": inner}}
+        scene = mi.load_dict(record, optimize=False)  # merged meshes have no names
+    return scene, {f"s{i}": i for i in range(len(record) - 1)}
+
+
+def build(name):
+    material = targets.MATERIALS[name]
+    scene, order = load(name)
     aim, _ = scan.aims()
-    chirps = trace(scene, order, scan.directions(aim), True)
+    chirps = trace(scene, order, scan.ORIGIN, scan.directions(aim), True)
     x, y = scan.grid()
     raster = np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)
-    field = trace(scene, order, scan.directions(raster), False)
+    field = trace(scene, order, scan.ORIGIN, scan.directions(raster), False)
     total, lobe = mi.load_dict(bsdf(material, "all")), mi.load_dict(bsdf(material, "specular"))
     table = np.array([[backscatter(total, a), backscatter(lobe, a)] for a in ANGLES])
     np.savez_compressed(
@@ -113,6 +121,5 @@ def build(name, folder):
 
 
 if __name__ == "__main__":
-    with tempfile.TemporaryDirectory() as folder:
-        for name in sys.argv[1:] or targets.MATERIALS:
-            build(name, folder)
+    for name in sys.argv[1:] or targets.MATERIALS:
+        build(name)

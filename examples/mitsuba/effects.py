@@ -158,13 +158,13 @@ def subsurface(s, size, rng):
 
 def thin_film(s, size, rng):
     """A coating of slightly uneven thickness; what comes from below crosses it twice. Airy's formula over the band."""
-    thickness, index, uneven = rng.uniform(0.9e-3, 2.2e-3), rng.uniform(1.5, 1.8), rng.normal(0, 0.3, 2)
+    thickness, index, uneven = rng.uniform(1.2e-3, 2.8e-3), rng.uniform(1.7, 2.2), rng.normal(0, 0.3, 2)
     d = thickness * (1 + 0.02 * np.sin(s.surface @ (uneven * 20)))
     inner = np.sqrt(1 - (np.sin(s.theta()) / index) ** 2)
     out = np.zeros(s.n)
     for frequency in np.linspace(286.5e9, 313.5e9, 9):
-        # from air through the film into a substrate of index 2.2, both polarisations alike (mean)
-        r1, r2 = (1 - index) / (1 + index), (index - 2.2) / (index + 2.2)
+        # from air through the film into a substrate of index 3.5, both polarisations alike (mean)
+        r1, r2 = (1 - index) / (1 + index), (index - 3.5) / (index + 3.5)
         turn = np.exp(-4j * np.pi * index * d * inner * frequency / physics.LIGHT_M_S)
         out += 1 - np.abs((r1 + r2 * turn) / (1 + r1 * r2 * turn)) ** 2
     ratio = (out / out.mean()) ** 2

@@ -152,7 +152,6 @@ def case(out, number, name, labels, strength, speckle_mm, shared, seed, level_sd
     for index, label in enumerate(labels):
         draw = [seed, number, 77 + index]
         size, left = effects.calibrate(functools.partial(State, base, name, w0), label, strength, draw, LOOKS)
-        # geometry first, and added power before gains, as the labels are sorted by the caller
         effects.EFFECTS[label](state, size, np.random.default_rng(draw))
         sizes[label], rms[label] = float(size), float(left)
         kind = getattr(state, "kind", kind)
@@ -219,6 +218,7 @@ def choose(allowed, number, labels, arguments, mm):
     return order[0]
 
 
+# Geometry first; added power after gains on the surface.
 ORDER = ["motion", "pose", "finite-spot", "angle-error", "anisotropy", "foreign-patch"]
 
 

@@ -68,7 +68,10 @@ def judge(answer, truth):
         return "unknown", verdict == "unexplained" and not said, said
     if len(labels) > 1:
         return "pair", set(labels) == set(said[:2]), said
-    kind = f"{truth['strength']}" if truth["reaches_strength"] else "not in the data"
+    kind = truth["strength"]
+    if not truth["reaches_strength"]:
+        left = truth["left_after_refit_db"][labels[0]]
+        kind = "moderate" if left >= 0.665 and kind == "strong" else "weak" if left >= 0.33 else "not in the data"
     return kind, said[:1] == labels, said
 
 

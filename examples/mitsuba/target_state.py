@@ -2,6 +2,7 @@
 
 import numpy as np
 from scipy.ndimage import map_coordinates
+from scipy.spatial.transform import Rotation
 
 import physics
 import scan
@@ -74,38 +75,21 @@ class State:
         return map_coordinates(values, [row, column], order=order, mode="nearest")
 
     def move(self, shift, turn):
-        """The target moves: for each chirp a shift (m) and small rotations about x, y, z (rad) about the centre.
+        """The target moves: for each chirp a shift, m, and a turn about the centre as a rotation vector, rad.
 
-        The ray is moved the other way, met with the tangent plane of the old hit and corrected by the raster's normals."""
-        def back(v):
-            return v - np.cross(turn, v)
+        Mitsuba traces the rays anew, each moved the other way against the target at rest."""
+        import build_bases
 
+        back = Rotation.from_rotvec(-turn)
         centre = targets.CENTRE
-        origin = back(scan.ORIGIN - centre - shift) + centre
-        ray = back(self.ray)
-        ray /= np.linalg.norm(ray, axis=1, keepdims=True)
-        hit = self.range_m > 0
-        point = np.where(hit[:, None], scan.ORIGIN + self.range_m[:, None] * self.ray, centre + np.pad(self.aim, ((0, 0), (0, 1))))
-        normal = np.where(hit[:, None], self.normal, [0.0, 0, 1])
-        length = np.sum((point - origin) * normal, 1) / np.sum(ray * normal, 1)
-        new = origin + length[:, None] * ray
-        seen = new - scan.ORIGIN
-        at = (seen[:, :2] / -seen[:, 2:]) * 8.0  # x_t, y_t of that place of the surface
-        piece = self.lookup(self.grid_piece, at, 0)
-        same = hit & (piece == self.piece)
-        change = np.stack([self.lookup(self.grid_normal[..., i], at, 1) - self.lookup(self.grid_normal[..., i], self.aim, 1) for i in range(3)], -1)
-        change[np.linalg.norm(change, axis=1) > 0.3] = 0
-        bent = normal + change
-        bent /= np.linalg.norm(bent, axis=1, keepdims=True)
-        sag = 0.5 * np.sum((new - point) * change, 1) / np.sum(ray * normal, 1)
-        other = (piece >= 0) & ~same
-        near = np.stack([self.lookup(self.grid_normal[..., i], at, 0) for i in range(3)], -1)
-        self.normal = np.where(other[:, None], near, bent)
-        self.range_m = np.where(same, length - sag, np.where(other, self.lookup(self.grid_range, at, 0), 0.0))
-        self.piece = np.where(same | other, piece, -1)
-        # incidence is counted in the target's frame: give the ray of that frame to theta()
-        self.normal += np.cross(turn, self.normal)
-        self.surface = at
+        origin = back.apply(scan.ORIGIN - centre - shift) + centre
+        hits = build_bases.trace(*build_bases.load(self.name), origin, back.apply(self.ray), False)
+        hit = hits["range"] > 0
+        point = origin + hits["range"][:, None] * back.apply(self.ray) - scan.ORIGIN
+        at = point[:, :2] / -np.where(hit, point[:, 2], -8.0)[:, None] * 8.0  # x_t, y_t of that place of the surface
+        self.surface = np.where(hit[:, None], at, self.aim)
+        self.range_m, self.piece = hits["range"], hits["piece"]
+        self.normal = back.inv().apply(hits["normal"])
 
     def grid_means_mw(self):
         """Mean echo on the raster, before any effect."""
