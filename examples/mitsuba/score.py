@@ -4,14 +4,16 @@ import argparse
 import collections
 import concurrent.futures
 import json
+import math
 import os
+import shutil
 import subprocess
 import time
 
 
 def diagnose(matdb, folder, seed):
-    """report.json of a case, with the seconds and the words if it failed."""
-    db, out = os.path.join(folder, "matdb.sqlite"), os.path.join(folder, "diagnosis")
+    """report.json of a case, with the seconds and the words if it failed. A report newer than cloud and program stays."""
+    db, out = os.path.join(folder, "matdb.sqlite"), os.path.join(folder, f"diagnosis-{seed}")
     start = time.time()
     if not os.path.exists(db):
         added = subprocess.run([matdb, "--db", db, "-q", "add", "--from", os.path.join(folder, "material")], capture_output=True, text=True)
@@ -19,6 +21,10 @@ def diagnose(matdb, folder, seed):
             return {"verdict": "crash", "words": added.stderr.strip()}
     report = os.path.join(out, "report.json")
     if os.path.exists(report):
+        inputs = [os.path.join(folder, "cloud.ply"), os.path.join(folder, "scene.toml"), shutil.which(matdb) or matdb]
+        if os.path.getmtime(report) > max(map(os.path.getmtime, inputs)):
+            with open(report) as file:
+                return {**json.load(file), "words": ""}
         os.remove(report)
     run = subprocess.run(
         [matdb, "--db", db, "-q", "diagnose", os.path.join(folder, "cloud.ply"), "--scene", os.path.join(folder, "scene.toml"), "--seed", str(seed), "-o", out],
@@ -42,7 +48,6 @@ def intervals(answer, truth):
     if "noise-floor" in truth["labels"]:
         # the power above the declared one
         total = 10 ** (truth["noise_dbm"] / 10)
-        import math
         known["noise-floor"]["level_dbm"] = 10 * math.log10(total - total / 10 ** (truth["sizes"]["noise-floor"] / 10))
     for name in effects:
         for key, value in known.get(name, {}).items():
