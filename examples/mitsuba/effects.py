@@ -67,7 +67,10 @@ def finite_spot(s, size, rng):
     power = s.grid_means_mw()
     sd, longer = size * 0.01 / 0.005, rng.uniform(1.0, 1.4)
     wide = 0.93 * gaussian_filter(power, (sd * longer, sd)) + 0.07 * gaussian_filter(power, 2.5 * sd)
-    s.spread = s.lookup(wide, s.aim, 1)
+    there = s.lookup(power, s.aim, 1)
+    exact = s.means_mw()[0]  # the raster gives the ratio, Mitsuba's own rays the power
+    ratio = s.lookup(wide, s.aim, 1) / np.maximum(there, 1e-30)
+    s.spread = np.where(exact > 0, exact * np.where(there > 0, ratio, 1.0), s.lookup(wide, s.aim, 1))
     nearest = s.range_m <= 0
     if nearest.any() and (~nearest).any():
         from scipy.spatial import cKDTree
@@ -85,7 +88,7 @@ def foreign_patch(s, size, rng):
     outline = radius * (1 + 0.25 * np.cos(2 * phi + bumps[0]) + 0.15 * np.cos(3 * phi + bumps[1]))
     inside = (np.hypot(*d.T) < outline) & (s.piece == s.piece[np.argmin(np.hypot(*d.T))])
     sign = rng.choice([-1, 1])
-    s.slope_scale = np.where(inside, 0.8, 1.0)  # its lobe is wider
+    s.slope_scale = np.where(inside, 0.8 ** min(size / 3, 1.0), 1.0)  # its lobe is wider
     s.gain = s.gain * physics.mw(size * sign * inside)
 
 

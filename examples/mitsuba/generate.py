@@ -187,7 +187,7 @@ def case(out, number, name, labels, strength, speckle_mm, shared, seed, level_sd
     truth = {
         "base": name, "labels": labels, "strength": strength if labels else None, "kind": kind, "sizes": sizes,
         "left_after_refit_db": rms,
-        "reaches_strength": all(rms[n] > 0.95 * effects.RMS_DB[strength] or n in ("speckle", "noise-floor") for n in labels),
+        "reaches_strength": all(0.95 <= rms[n] / effects.RMS_DB[strength] <= 1.1 or n in ("speckle", "noise-floor") for n in labels),
         "level_offset_db": level, "speckle": f"shared, w0 = {speckle_mm} mm" if shared else "independent",
         "looks": float(looks), "noise_dbm": float(physics.db(declared_noise * state.noise_gain)),
         "chirps": state.n, "hits": int(hit.sum()), "detections": int(np.isfinite(seen).sum()), "false_alarms": int(alarm.sum()),
@@ -212,7 +212,8 @@ def choose(allowed, number, labels, arguments, mm):
             draw = [arguments.seed, number, 77 + index]
             goal = effects.RMS_DB[arguments.strength] if label not in ("speckle", "noise-floor") else 0
             make = functools.partial(State, base, name, physics.waist_m(mm))
-            reached = reached and effects.calibrate(make, label, arguments.strength, draw, LOOKS)[1] > 0.95 * goal
+            left = effects.calibrate(make, label, arguments.strength, draw, LOOKS)[1]
+            reached = reached and 0.95 * goal <= left <= 1.1 * goal
         if reached:
             return name
     return order[0]
