@@ -1,0 +1,166 @@
+"""Check the generator against closed forms. Needs Mitsuba only for the silhouettes. Exits with 1 if a check fails."""
+
+import sys
+
+import numpy as np
+
+import physics
+import scan
+import targets
+from target_state import State
+
+FAILED = []
+
+
+def say(what, value, limit):
+    good = value <= limit
+    print(f"{'ok  ' if good else 'FAIL'} {what}: {value:.4g} (at most {limit:g})")
+    if not good:
+        FAILED.append(what)
+
+
+def smith(kind, m, t):
+    if kind == "ggx":
+        return 2 / (1 + np.sqrt(1 + m**2 * np.tan(t) ** 2))
+    a = 1 / (m * np.tan(np.maximum(t, 1e-9)))
+    return np.where(a < 1.6, (3.535 * a + 2.181 * a**2) / (1 + 2.276 * a + 2.577 * a**2), 1.0)
+
+
+def closed_form(material, t):
+    """(12) to (15) with o = i, for the materials that have such a form."""
+    m = material["m"]
+    if material["distribution"] == "ggx":
+        d = m**2 / (np.pi * np.cos(t) ** 4 * (m**2 + np.tan(t) ** 2) ** 2)
+    else:
+        d = np.exp(-np.tan(t) ** 2 / m**2) / (np.pi * m**2 * np.cos(t) ** 4)
+    lobe = material["f"] * d * smith(material["distribution"], m, t) ** 2 / (4 * np.cos(t) ** 2)
+    return (1 - material["k"]) * lobe, material["k"] * material["r"] / np.pi
+
+
+def bases():
+    for name, material in targets.MATERIALS.items():
+        base = dict(np.load(f"bases/{name}.npz"))
+        state = State(base, name, physics.waist_m(13.6))
+        hit = base["range_m"] > 0
+        t = state.clean_theta()[hit]
+        if material["kind"] == "blend":
+            lobe, rest = closed_form(material, t)
+            say(f"{name}: Mitsuba's f cos(theta) of every chirp against (12)-(15), worst dB",
+                np.abs(physics.db(base["f_cos"][hit]) - physics.db((lobe + rest) * np.cos(t))).max(), 0.02)
+        table = state.law.bare(t, "lobe") + state.law.bare(t, "rest")
+        say(f"{name}: its table against every chirp, worst dB", np.abs(physics.db(table * np.cos(t)) - physics.db(base["f_cos"][hit])).max(), 0.05)
+        if material["kind"] == "blend" and material["distribution"] == "beckmann":
+            # Beckmann's slopes and the beam's are both Gaussian: m^2 + delta^2, up to the prefactors' slow change
+            t = np.radians(np.arange(0, 14, 0.5))
+            delta = physics.WAVELENGTH_M / (2 * np.pi * physics.waist_m(13.6))
+            wide = closed_form({**material, "m": np.hypot(material["m"], delta)}, t)[0]
+            say(f"{name}: lobe widened by the beam against m^2 + delta^2, worst dB", np.abs(physics.db(state.law.f(t, delta, "lobe") / wide)).max(), 0.1)
+        power, _ = state.means_mw()
+        n = 2 if material["footprint"] == "paper" else 1
+        w = physics.beam_width_m(physics.waist_m(13.6), base["range_m"][hit])
+        t = state.clean_theta()[hit]
+        eleven = physics.mw(7 - 12.5) * physics.WAVELENGTH_M**2 / (np.pi * w**2) * table * np.cos(t) ** n
+        say(f"{name}: widened power against (11) with the bare table, median dB", abs(np.median(physics.db(power[hit] / eleven))), 0.2)
+
+
+def speckle():
+    rng = np.random.default_rng(1)
+    for mm in physics.SPOT:
+        w0, step = physics.waist_m(mm), 0.004
+        x, y = np.meshgrid(np.arange(-0.25, 0.25, step), np.arange(-0.45, 0.45, step))
+        where, lags, contrast, fields = np.stack([x.ravel(), y.ravel()], -1), [], [], []
+        for _ in range(4):
+            f = physics.speckle(rng, 4, w0, where, np.zeros(x.size, int), True).reshape(4, *x.shape)
+            lags.append([np.mean(f[:, :, k:] * f[:, :, :x.shape[1] - k].conj()).real / np.mean(np.abs(f) ** 2) for k in (1, 2, 3, 4, 6)])
+            contrast.append(np.std(np.abs(f) ** 2) / np.mean(np.abs(f) ** 2))
+            fields.append(np.mean(np.abs(f) ** 2))
+        d = step * np.array([1, 2, 3, 4, 6])
+        say(f"w0 = {mm} mm: correlation of amplitudes against exp(-d^2/w0^2), worst", np.abs(np.mean(lags, 0) - np.exp(-(d**2) / w0**2)).max(), 0.03)
+        say(f"w0 = {mm} mm: contrast of one look against 1", abs(np.mean(contrast) - 1), 0.05)
+        say(f"w0 = {mm} mm: mean intensity against 1", abs(np.mean(fields) - 1), 0.05)
+    f = physics.speckle(rng, 4, 0.0136, np.zeros((40000, 2)), np.zeros(40000, int), False)
+    say("independent, 4 looks: contrast against 1/2", abs(np.std(np.mean(np.abs(f) ** 2, 0)) - 0.5), 0.01)
+
+
+def noise():
+    rng, n = np.random.default_rng(2), 400_000
+    level = physics.mean_noise_mw(4)
+    f = physics.speckle(rng, 4, 0.0136, np.zeros((n, 2)), np.zeros(n, int), False)
+    _, _, alarm = physics.detect(rng, np.zeros(n), np.zeros(n), np.zeros(n), f, level)
+    expected = physics.FALSE_ALARM * n
+    say("false alarms of empty gates, standard deviations off", abs(alarm.sum() - expected) / np.sqrt(expected), 3)
+    # censoring of an echo that has the threshold's own mean: a sum of four exponentials
+    from scipy.special import gammaincc
+    mean = physics.mw(physics.THRESHOLD_DBM) - level
+    seen, _, _ = physics.detect(rng, np.full(n, mean), np.zeros(n), np.full(n, 8.0), f, level)
+    say("share of detections at the threshold against Gamma(4)", abs(np.isfinite(seen).mean() - gammaincc(4, 4)), 0.005)
+
+
+def silhouettes():
+    import tempfile
+
+    import mitsuba as mi
+
+    mi.set_variant("scalar_rgb")
+    aim, _ = scan.aims()
+    with tempfile.TemporaryDirectory() as folder:
+        for name, mesh in targets.MESHES.items():
+            record = {"type": "scene"}
+            for i, (v, f) in enumerate(mesh()):
+                targets.write_ply(f"{folder}/{name}{i}.ply", v, f)
+                record[f"s{i}"] = {"type": "ply", "filename": f"{folder}/{name}{i}.ply", "face_normals": True}
+            scene = mi.load_dict(record)
+            base = dict(np.load(f"bases/{name}.npz"))
+            r, t = np.zeros(len(aim)), np.zeros(len(aim))
+            for i, d in enumerate(scan.directions(aim)):
+                si = scene.ray_intersect(mi.Ray3f(list(scan.ORIGIN), list(d)))
+                if si.is_valid():
+                    r[i], t[i] = si.t, np.arccos(min(1, abs(np.array(si.n) @ d)))
+            both = (r > 0) & (base["range_m"] > 0)
+            theta = np.arccos(np.clip(np.abs(np.sum(base["normal"] * scan.directions(aim), 1)), 0, 1))
+            say(f"{name}: chirps that meet only the shape or only the user's mesh", np.sum((r > 0) != (base["range_m"] > 0)), 6)
+            say(f"{name}: range of the user's mesh, 99 % within, mm", 1e3 * np.quantile(np.abs(r - base["range_m"])[both], 0.99), 0.5)
+            near = both & (theta < 0.4)
+            say(f"{name}: incidence on the user's mesh below 23 degrees, rms mrad", 1e3 * np.sqrt(np.mean((t - theta)[near] ** 2)), 2)
+
+
+def moves():
+    """The moved target of `motion` and `pose` against Mitsuba's rays on meshes that were moved as much."""
+    import tempfile
+
+    import mitsuba as mi
+
+    shift, turn = np.array([4e-3, -2e-3, 5e-3]), np.radians([0.8, -1.2, 0.5])
+    for name in ("cylinder", "body", "groove", "vase"):  # the cylinder's mesh has facets of 2.5 mrad, Mitsuba's is round
+        state = State(dict(np.load(f"bases/{name}.npz")), name, physics.waist_m(13.6))
+        still = state.range_m.copy()
+        state.move(np.tile(shift, (state.n, 1)), np.tile(turn, (state.n, 1)))
+        angle = np.linalg.norm(turn)
+        k = np.cross(np.eye(3), turn / angle)
+        matrix = np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
+        record = {"type": "scene"}
+        with tempfile.TemporaryDirectory() as folder:
+            for i, (v, f) in enumerate(targets.MESHES[name]()):
+                targets.write_ply(f"{folder}/{i}.ply", (v - targets.CENTRE) @ matrix.T + targets.CENTRE + shift, f)
+                record[f"s{i}"] = {"type": "ply", "filename": f"{folder}/{i}.ply", "face_normals": True}
+            scene = mi.load_dict(record)
+        r, t = np.zeros(state.n), np.zeros(state.n)
+        for i, d in enumerate(state.ray):
+            si = scene.ray_intersect(mi.Ray3f(list(scan.ORIGIN), list(d)))
+            if si.is_valid():
+                r[i], t[i] = si.t, np.arccos(min(1, abs(np.array(si.n) @ d)))
+        both = (r > 0) & (state.range_m > 0)
+        say(f"{name}: moved, share of chirps where only one of the two hits", np.mean((r > 0) != (state.range_m > 0)), 0.002)
+        say(f"{name}: moved, range, 95 % within, mm", 1e3 * np.quantile(np.abs(r - state.range_m)[both], 0.95), 0.01)
+        say(f"{name}: (the move itself, median mm of range)", 1e3 * np.median(np.abs(r - still)[both & (still > 0)]), 50)
+        say(f"{name}: moved, incidence, median mrad", 1e3 * np.median(np.abs(t - state.clean_theta())[both]), 1)
+        say(f"{name}: moved, incidence, 95 % within, mrad", 1e3 * np.quantile(np.abs(t - state.clean_theta())[both], 0.95), 3)
+
+
+if __name__ == "__main__":
+    bases()
+    speckle()
+    noise()
+    silhouettes()
+    moves()
+    sys.exit(1 if FAILED else 0)

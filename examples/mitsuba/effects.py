@@ -1,0 +1,271 @@
+"""The undeclared effects. Each has a shape of its own; `size` scales it and is calibrated by what a refit leaves.
+
+`apply(state, size, rng)` changes the state. Draws come from rng in the same order whatever the size."""
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import gaussian_filter
+from scipy.special import polygamma
+
+import physics
+import scan
+
+RMS_DB = {"weak": 0.35, "moderate": 0.7, "strong": 1.4}
+# Effects that change a scatter or a count: a strength of their own.
+SPECKLE_EXCESS_DB = {"weak": 0.8, "moderate": 1.5, "strong": 2.5}  # sqrt(sd^2 - declared sd^2) of the powers in dB
+NOISE_DB = {"weak": 0.7, "moderate": 1.5, "strong": 2.5}
+UNKNOWN = ("spiral", "stripes", "sawtooth", "checkers")
+
+
+def angle_error(s, size, rng):
+    tail = rng.standard_t(5, size=(s.n, 2)) / np.sqrt(5 / 3)
+    s.tilt = np.radians(size) * tail
+
+
+def anisotropy(s, size, rng):
+    """Brushed along a grain that swings over the target; the density of slopes keeps its integral."""
+    sway, start = rng.uniform(0.1, 0.5), rng.uniform(0, np.pi)
+    grain = start + sway * np.sin(s.surface[:, 1] / 0.15)
+    along = np.stack([np.cos(grain), np.sin(grain), np.zeros(s.n)], -1)
+    along -= s.normal * np.sum(along * s.normal, 1, keepdims=True)
+    along /= np.linalg.norm(along, axis=1, keepdims=True) + 1e-12
+    across = np.cross(s.normal, along)
+    a, b = np.sum(s.ray * along, 1), np.sum(s.ray * across, 1)
+    r = np.exp(0.5 * size * 0.2)
+    s.slope_scale = np.sqrt(((a / r) ** 2 + (b * r) ** 2) / (a**2 + b**2 + 1e-15))
+
+
+def compression(s, size, rng):
+    s.ceiling_mw = s.means_mw()[0].max() / size
+
+
+def covering_layer(s, size, rng):
+    """A polygon of five to seven corners; the loss grows with the way through it, and its thickness varies."""
+    hit = np.flatnonzero(s.range_m > 0)
+    centre = s.aim[rng.choice(hit)] * 0.6 + s.aim[hit].mean(0) * 0.4
+    corners = rng.integers(5, 8)
+    phi = np.sort((np.arange(corners) + rng.uniform(-0.3, 0.3, corners)) * 2 * np.pi / corners)
+    corner = centre + (rng.uniform(0.10, 0.22, corners) * np.array([np.cos(phi), 1.4 * np.sin(phi)])).T
+    inside = np.zeros(s.n, bool)
+    for a, b in zip(corner, np.roll(corner, -1, 0)):
+        cross = (a[1] > s.surface[:, 1]) != (b[1] > s.surface[:, 1])
+        x = a[0] + (s.surface[:, 1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+        inside ^= cross & (s.surface[:, 0] < x)
+    thick = 1 + 0.15 * np.sin(s.surface @ rng.normal(0, 12, 2) + rng.uniform(0, 6))
+    s.gain = s.gain * physics.mw(-size * inside * thick / np.cos(s.theta()))
+
+
+def drift(s, size, rng):
+    """A warm-up that levels off, and two bends."""
+    tau, knots = rng.uniform(0.1, 0.5), rng.normal(size=5)
+    path = rng.choice([-1, 1]) * np.exp(-s.share / tau) * 2 + CubicSpline(np.linspace(0, 1, 5), knots)(s.share) * 0.6
+    s.gain = s.gain * physics.mw(size * path)
+
+
+def finite_spot(s, size, rng):
+    """A footprint `size` cm wide (two-way sd), longer in one direction, and a weak wide foot."""
+    power = s.grid_means_mw()
+    sd, longer = size * 0.01 / 0.005, rng.uniform(1.0, 1.4)
+    wide = 0.93 * gaussian_filter(power, (sd * longer, sd)) + 0.07 * gaussian_filter(power, 2.5 * sd)
+    there = s.lookup(power, s.aim, 1)
+    exact = s.means_mw()[0]  # the raster gives the ratio, Mitsuba's own rays the power
+    ratio = s.lookup(wide, s.aim, 1) / np.maximum(there, 1e-30)
+    s.spread = np.where(exact > 0, exact * np.where(there > 0, ratio, 1.0), s.lookup(wide, s.aim, 1))
+    nearest = s.range_m <= 0
+    if nearest.any() and (~nearest).any():
+        from scipy.spatial import cKDTree
+        hit = np.flatnonzero(~nearest)
+        _, index = cKDTree(s.aim[hit]).query(s.aim[nearest])
+        s.range_m[nearest], s.piece[nearest] = s.range_m[hit[index]], s.piece[hit[index]]
+        s.normal[nearest] = s.normal[hit[index]]
+
+
+def foreign_patch(s, size, rng):
+    hit = np.flatnonzero((s.range_m > 0) & (s.clean_theta() < np.radians(60)))
+    centre, radius = s.aim[rng.choice(hit)], rng.uniform(0.045, 0.085)
+    d = s.surface - centre
+    phi, bumps = np.arctan2(d[:, 1], d[:, 0]), rng.uniform(0, 6, 2)
+    outline = radius * (1 + 0.25 * np.cos(2 * phi + bumps[0]) + 0.15 * np.cos(3 * phi + bumps[1]))
+    inside = (np.hypot(*d.T) < outline) & (s.piece == s.piece[np.argmin(np.hypot(*d.T))])
+    sign = rng.choice([-1, 1])
+    s.slope_scale = np.where(inside, 0.8 ** min(size / 3, 1.0), 1.0)  # its lobe is wider
+    s.gain = s.gain * physics.mw(size * sign * inside)
+
+
+def fov_gain(s, size, rng):
+    x0, y0, power = rng.uniform(-0.06, 0.06), rng.uniform(-0.1, 0.1), rng.uniform(1.5, 2.8)
+    r = np.hypot((s.aim[:, 0] - x0) / 0.25, (s.aim[:, 1] - y0) / 0.45)
+    s.gain = s.gain * physics.mw(size * rng.choice([-1, 1, -1]) * (r**power + 0.2 * s.aim[:, 0] / 0.25))
+
+
+def motion(s, size, rng):
+    """A path with turns in all six degrees of freedom that begins at rest."""
+    knots = rng.normal(size=(8, 6)) * np.array([4e-3, 2e-3, 4e-3, 0.008, 0.012, 0.006])
+    knots[0] = 0
+    path = size * CubicSpline(np.linspace(0, 1, 8), knots)(s.share)
+    s.move(path[:, :3], path[:, 3:])
+
+
+def pose(s, size, rng):
+    v = rng.normal(size=6) * np.array([4e-3, 4e-3, 4e-3, 0.01, 0.015, 0.01])
+    s.move(np.tile(size * v[:3], (s.n, 1)), np.tile(size * v[3:], (s.n, 1)))
+
+
+def multi_bounce(s, size, rng):
+    """Both flanks of the groove light each other; the antenna sees the second surface through a wide pattern."""
+    wide, area = 0.06, 0.005**2
+    grid = np.flatnonzero(np.isin(s.grid_piece.ravel(), (1, 2)))
+    x, y = np.meshgrid(s.grid_x, s.grid_y)
+    aim = np.stack([x.ravel(), y.ravel()], -1)[grid]
+    q_ray = scan.directions(aim)
+    q = scan.ORIGIN + s.grid_range.ravel()[grid, None] * q_ray
+    q_normal, q_piece = s.grid_normal.reshape(-1, 3)[grid], s.grid_piece.ravel()[grid]
+
+    def f(a, b, normal):
+        h = a + b
+        h /= np.linalg.norm(h, axis=-1, keepdims=True)
+        angle = np.arccos(np.clip(np.abs(np.sum(h * normal, -1)), 0, 1))
+        return s.law.bare(angle, "lobe") + s.law.bare(angle, "rest")
+
+    way = np.zeros(s.n)
+    for i in np.flatnonzero(np.isin(s.piece, (1, 2))):
+        other = (q_piece != s.piece[i]) & (np.hypot(*(aim - s.aim[i]).T) < 2 * wide)
+        p = scan.ORIGIN + s.range_m[i] * s.ray[i]
+        step = q[other] - p
+        d = np.linalg.norm(step, axis=1)
+        u = step / d[:, None]
+        c1, c2 = np.clip(u @ s.normal[i], 0, 1), np.clip(-np.sum(u * q_normal[other], 1), 0, 1)
+        pattern = 2 / (np.pi * wide**2) * np.exp(-2 * np.sum((aim[other] - s.aim[i]) ** 2, 1) / wide**2)
+        both = f(-s.ray[i], u, s.normal[i]) * c1 * f(-u, -q_ray[other], q_normal[other]) * c2
+        each = physics.WAVELENGTH_M**2 * pattern * area * both / np.maximum(d, 0.004) ** 2
+        s.added_mw[i] += size * each.sum() * physics.mw(physics.POWER_DBM - physics.loss_db(s.w0))
+        length = (s.range_m[i] + d + s.grid_range.ravel()[grid][other]) / 2
+        way[i] = np.sum(each * (length - s.range_m[i])) / max(each.sum(), 1e-30)
+    total, _ = s.means_mw()
+    s.echo_shift = np.where(total > 0, way * s.added_mw / np.maximum(total, 1e-30), 0)
+
+
+def noise_floor(s, size, rng):
+    s.noise_gain = physics.mw(size)
+
+
+def few_looks(s, size, rng):
+    s.looks = size
+
+
+def subsurface(s, size, rng):
+    """Volume return, a little stronger at normal incidence than at grazing."""
+    theta = s.theta()
+    s.added_mw = s.added_mw + s.scale_mw(np.where(s.range_m > 0, s.range_m, 8)) * 1e-3 * size * (0.8 + 0.3 * np.cos(theta)) / (4 * np.pi)
+
+
+def thin_film(s, size, rng):
+    """A coating of slightly uneven thickness; what comes from below crosses it twice. Airy's formula over the band."""
+    thickness, index, uneven = rng.uniform(1.2e-3, 2.8e-3), rng.uniform(1.7, 2.2), rng.normal(0, 0.3, 2)
+    d = thickness * (1 + 0.02 * np.sin(s.surface @ (uneven * 20)))
+    inner = np.sqrt(1 - (np.sin(s.theta()) / index) ** 2)
+    out = np.zeros(s.n)
+    for frequency in np.linspace(286.5e9, 313.5e9, 9):
+        # from air through the film into a substrate of index 3.5, both polarisations alike (mean)
+        r1, r2 = (1 - index) / (1 + index), (index - 3.5) / (index + 3.5)
+        turn = np.exp(-4j * np.pi * index * d * inner * frequency / physics.LIGHT_M_S)
+        out += 1 - np.abs((r1 + r2 * turn) / (1 + r1 * r2 * turn)) ** 2
+    ratio = (out / out.mean()) ** 2
+    s.rest_gain = s.rest_gain * np.maximum(1 + size * (ratio - 1), 0.02)
+
+
+def correlated_shadowing(s, size, rng):
+    """G1 in place of its square, with Smith's function of the lobe's own slopes as Walter gives it."""
+    slope = s.material["m"] * np.tan(np.maximum(s.theta(), 1e-6))
+    a = 1 / slope
+    g = np.where(a < 1.6, (3.535 * a + 2.181 * a**2) / (1 + 2.276 * a + 2.577 * a**2), 1.0)
+    if s.material["distribution"] == "ggx":
+        g = 2 / (1 + np.sqrt(1 + slope**2))
+    s.lobe_gain = s.lobe_gain * g**-min(size, 1.0)
+
+
+def unknown(s, size, rng):
+    kind = UNKNOWN[rng.integers(len(UNKNOWN))]
+    x, y = s.surface.T
+    if kind == "spiral":
+        c = rng.uniform(-0.08, 0.08, 2)
+        wave = np.sin(3 * np.arctan2(y - c[1], x - c[0]) + np.hypot(x - c[0], y - c[1]) / rng.uniform(0.012, 0.025))
+    elif kind == "stripes":  # as of a surface whose stripes turn the polarisation
+        azimuth = np.arctan2(s.normal[:, 1], s.normal[:, 0])
+        wave = np.cos(2 * azimuth) * np.sign(np.sin((x + 0.5 * y) / rng.uniform(0.015, 0.03)))
+    elif kind == "sawtooth":
+        wave = 2 * ((np.arange(s.n) / rng.uniform(200, 420)) % 1) - 1
+    else:
+        wave = np.sign(np.sin(x / 0.02) * np.sin(y / 0.026))
+    s.gain = s.gain * physics.mw(size * wave)
+    s.kind = kind
+
+
+EFFECTS = {
+    "angle-error": angle_error, "anisotropy": anisotropy, "compression": compression, "covering-layer": covering_layer,
+    "drift": drift, "finite-spot": finite_spot, "foreign-patch": foreign_patch, "fov-gain": fov_gain, "motion": motion,
+    "multi-bounce": multi_bounce, "noise-floor": noise_floor, "pose": pose, "speckle": few_looks, "subsurface": subsurface,
+    "thin-film": thin_film, "correlated-shadowing": correlated_shadowing, "unknown": unknown,
+}
+LIMIT = {"thin-film": 1.0, "correlated-shadowing": 1.0}  # sizes beyond which the effect would not be itself
+# Where an effect needs a target of its own: a lobe that is seen all around, a concave place, a rough lobe.
+BASES = {"multi-bounce": ["groove"], "correlated-shadowing": ["vase"]}
+
+
+def left_after_refit_db(before, after):
+    """Rms change, dB, that level, lobe level, lobe width and the diffuse part's slope cannot follow."""
+    p0, share = before.means_mw()
+    p1, _ = after.means_mw()
+    if after.ceiling_mw is not None:
+        p1 = after.ceiling_mw * np.tanh(np.sqrt(p1 / after.ceiling_mw)) ** 2
+    use = (before.range_m > 0) & (after.range_m > 0) & (p0 > physics.mw(physics.THRESHOLD_DBM))
+    theta = before.theta()[use]
+    law, step = before.law, 1e-3
+    steeper = np.log(law.bare(np.arctan(np.tan(theta) * (1 + step)), "lobe") / law.bare(theta, "lobe")) / step
+    share, change = share[use], (physics.db(p1) - physics.db(p0))[use]
+    columns = np.stack([np.ones(len(theta)), share, share * steeper, (1 - share) * np.log(np.cos(theta))], -1)
+    fitted = columns @ np.linalg.lstsq(columns, change, rcond=None)[0]
+    return float(np.sqrt(np.mean((change - fitted) ** 2)))
+
+
+def looks_for(declared, excess_db):
+    """Looks whose scatter in dB exceeds that of the declared ones by this much, in squares."""
+    factor = (10 / np.log(10)) ** 2
+    wanted = factor * polygamma(1, declared) + excess_db**2
+    low, high = 0.2, float(declared)
+    for _ in range(60):
+        middle = np.sqrt(low * high)
+        low, high = (middle, high) if factor * polygamma(1, middle) > wanted else (low, middle)
+    return high
+
+
+def calibrate(make, name, strength, seed, looks):
+    """Size of an effect for a strength, and the rms that it leaves, dB."""
+    if name == "speckle":
+        return looks_for(looks, SPECKLE_EXCESS_DB[strength]), SPECKLE_EXCESS_DB[strength]
+    if name == "noise-floor":
+        return NOISE_DB[strength], 0.0
+    goal, start = RMS_DB[strength], 1e-2
+
+    def left(size):
+        before, after = make(), make()
+        EFFECTS[name](after, size, np.random.default_rng(seed))
+        return left_after_refit_db(before, after)
+
+    # the first crossing on the way up: a ceiling over everything leaves nothing again
+    low = best = start
+    most, size, limit = 0.0, start, LIMIT.get(name, 1e4)
+    while size <= limit:
+        now = left(size)
+        if now > most:
+            best, most = size, now
+        if now >= goal or now < 0.7 * most:
+            break
+        low, size = size, (size * 2 if size == limit else min(size * 2, limit))
+    if most < goal:
+        return best, most
+    high = size
+    for _ in range(12):
+        middle = np.sqrt(low * high)
+        low, high = (middle, high) if left(middle) < goal else (low, middle)
+    return high, left(high)

@@ -1,0 +1,102 @@
+"""What a scan meets: geometry of every chirp and its mean power, which an effect may change."""
+
+import numpy as np
+from scipy.ndimage import map_coordinates
+from scipy.spatial.transform import Rotation
+
+import physics
+import scan
+import targets
+
+
+class State:
+    def __init__(self, base, name, w0):
+        self.base, self.name, self.w0, self.law = base, name, w0, physics.Law(base, w0)
+        self.material = targets.MATERIALS[name]
+        self.aim, self.time_s = scan.aims()
+        self.n = len(self.aim)
+        self.share = (np.arange(self.n) + 0.5) / self.n
+        self.ray = scan.directions(self.aim)
+        self.range_m = base["range_m"].copy()
+        self.normal = base["normal"].astype(float)
+        self.piece = base["piece"].astype(int)
+        self.surface = self.aim.copy()  # where on the target, as x_t and y_t of the undisturbed scan
+        self.slope_scale = np.ones(self.n)  # what multiplies the slope at which the lobe is looked up
+        self.lobe_gain, self.rest_gain, self.gain = np.ones(self.n), np.ones(self.n), np.ones(self.n)
+        self.added_mw = np.zeros(self.n)
+        self.spread = None  # a map that replaces the mean power
+        self.ceiling_mw, self.noise_gain, self.looks = None, 1.0, None
+        self.tilt = np.zeros(self.n)
+        self.grid_x, self.grid_y = scan.grid()
+        shape = (len(self.grid_y), len(self.grid_x))
+        self.grid_range = base["grid_range_m"].reshape(shape)
+        self.grid_piece = base["grid_piece"].reshape(shape).astype(int)
+        self.grid_normal = base["grid_normal"].reshape(shape + (3,)) / 32000.0
+
+    def theta(self):
+        if np.ndim(self.tilt) == 2:
+            slope = np.tan(self.clean_theta())
+            return np.arctan(np.hypot(slope + self.tilt[:, 0], self.tilt[:, 1]))
+        return self.clean_theta()
+
+    def clean_theta(self):
+        return np.arccos(np.clip(-np.sum(self.normal * self.ray, 1), 0.01, 1))
+
+    def scale_mw(self, range_m):
+        """P_t L lambda^2/(pi w^2): what multiplies f cos^n."""
+        w = physics.beam_width_m(self.w0, range_m)
+        return physics.mw(physics.POWER_DBM - physics.loss_db(self.w0)) * physics.WAVELENGTH_M**2 / (np.pi * w**2)
+
+    def parts_mw(self, theta, range_m, slope_scale=1.0):
+        delta = physics.WAVELENGTH_M / (2 * np.pi * physics.beam_width_m(self.w0, range_m))
+        power = 2 if self.material["footprint"] == "paper" else 1
+        common = self.scale_mw(range_m) * np.cos(theta) ** power
+        met = np.arctan(np.tan(theta) * slope_scale)
+        # a lobe D/(4 cos^2 ...) ~ g(slope)/cos^6: only the density of slopes is stretched
+        stretch = (np.cos(met) / np.cos(theta)) ** 6 if np.ndim(slope_scale) else 1.0
+        return common * self.law.f(met, delta, "lobe") * stretch, common * self.law.f(theta, delta, "rest")
+
+    def means_mw(self):
+        """Mean echo of each chirp, 0 where it hits nothing, and the share of the lobe."""
+        hit = self.range_m > 0
+        safe = np.where(hit, self.range_m, 8.0)
+        theta = np.where(hit, self.theta(), 0.0)
+        lobe, rest = self.parts_mw(theta, safe, self.slope_scale if np.any(self.slope_scale != 1) else 1.0)
+        lobe, rest = lobe * self.lobe_gain * self.gain, rest * self.rest_gain * self.gain
+        total = np.where(hit, lobe + rest + self.added_mw, 0.0)
+        share = lobe / (lobe + rest + self.added_mw)
+        if self.spread is not None:
+            total = self.spread * np.where(hit, self.gain, 1.0)
+        return total, share
+
+    def lookup(self, values, at, order):
+        row = (at[:, 1] - self.grid_y[0]) / (self.grid_y[1] - self.grid_y[0])
+        column = (at[:, 0] - self.grid_x[0]) / (self.grid_x[1] - self.grid_x[0])
+        return map_coordinates(values, [row, column], order=order, mode="nearest")
+
+    def move(self, shift, turn):
+        """The target moves: for each chirp a shift, m, and a turn about the centre as a rotation vector, rad.
+
+        Mitsuba traces the rays anew, each moved the other way against the target at rest."""
+        import build_bases
+
+        back = Rotation.from_rotvec(-turn)
+        centre = targets.CENTRE
+        origin = back.apply(scan.ORIGIN - centre - shift) + centre
+        hits = build_bases.trace(*build_bases.load(self.name), origin, back.apply(self.ray), False)
+        hit = hits["range"] > 0
+        point = origin + hits["range"][:, None] * back.apply(self.ray) - scan.ORIGIN
+        at = point[:, :2] / -np.where(hit, point[:, 2], -8.0)[:, None] * 8.0  # x_t, y_t of that place of the surface
+        self.surface = np.where(hit[:, None], at, self.aim)
+        self.range_m, self.piece = hits["range"], hits["piece"]
+        self.normal = back.inv().apply(hits["normal"])
+
+    def grid_means_mw(self):
+        """Mean echo on the raster, before any effect."""
+        x, y = np.meshgrid(self.grid_x, self.grid_y)
+        ray = scan.directions(np.stack([x.ravel(), y.ravel()], -1))
+        hit = self.grid_range.ravel() > 0
+        safe = np.where(hit, self.grid_range.ravel(), 8.0)
+        theta = np.where(hit, np.arccos(np.clip(-np.sum(self.grid_normal.reshape(-1, 3) * ray, 1), 0.01, 1)), 0)
+        lobe, rest = self.parts_mw(theta, safe)
+        return np.where(hit, lobe + rest, 0.0).reshape(self.grid_range.shape)
