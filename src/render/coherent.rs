@@ -116,18 +116,16 @@ pub(super) struct SpotRays<'a> {
 impl SpotRays<'_> {
     /// Gives the coherent parts of the single paths of a chirp the power of the waves of their pieces.
     pub fn cut_waves(&self, direct: &[RayPath], paths: &mut [Path]) {
-        let mut left: Vec<RayPath> = direct
-            .iter()
-            .filter(|ray| paths[ray.place].power_w * paths[ray.place].coherent_share > 0.0)
-            .copied()
-            .collect();
+        // A ray that returns no wave is on its piece all the same.
+        let mut left = direct.to_vec();
         while let Some(first) = left.first() {
             let (pieces, sheets) = (paths[first.place].pieces, paths[first.place].sheets);
             let is_here = |ray: &RayPath| {
                 paths[ray.place].pieces == pieces && paths[ray.place].sheets == sheets
             };
             let (here, others) = left.iter().copied().partition::<Vec<_>, _>(is_here);
-            if here.len() < self.places.len() {
+            let is_wave = here.iter().any(|ray| paths[ray.place].coherent_w() > 0.0);
+            if is_wave && here.len() < self.places.len() {
                 let ratio = self.wave_over_rays(&here, paths);
                 for ray in &here {
                     paths[ray.place].scale_coherent(ratio);
@@ -139,7 +137,7 @@ impl SpotRays<'_> {
 
     /// a²/b of a piece.
     fn wave_over_rays(&self, here: &[RayPath], paths: &[Path]) -> f64 {
-        let level = |ray: &RayPath| paths[ray.place].power_w * paths[ray.place].coherent_share;
+        let level = |ray: &RayPath| paths[ray.place].coherent_w();
         let mut is_here = vec![false; self.places.len()];
         here.iter().for_each(|ray| is_here[ray.ray] = true);
         let compared: Vec<&RayPath> =
@@ -165,9 +163,14 @@ impl SpotRays<'_> {
 }
 
 impl Path {
+    /// Power of its coherent part, W.
+    fn coherent_w(&self) -> f64 {
+        self.power_w * self.coherent_share
+    }
+
     /// Multiplies the power of its coherent part.
     fn scale_coherent(&mut self, ratio: f64) {
-        let coherent_w = self.power_w * self.coherent_share;
+        let coherent_w = self.coherent_w();
         let power_w = self.power_w + (ratio - 1.0) * coherent_w;
         self.coherent_share = if power_w > 0.0 { ratio * coherent_w / power_w } else { 0.0 };
         self.power_w = power_w;

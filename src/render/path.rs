@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex;
 
+use crate::brdf::Seen;
 use crate::radar::Detection;
 use crate::trace::Hit;
 
@@ -117,6 +118,23 @@ fn waves_by_surfaces(paths: &[Path]) -> Vec<(Surfaces, Detection)> {
 type Surfaces = ([u32; 2], u8, u8);
 
 impl Path {
+    /// The way to a hit on a smooth piece and straight back, through nothing.
+    pub fn single(hit: Hit, power_w: f64, seen: Seen, piece: u32) -> Path {
+        Path {
+            range_m: hit.range_m,
+            power_w,
+            hit,
+            sheets: 0,
+            passed_share: 1.0,
+            delay_m: 0.0,
+            pieces: [piece; 2],
+            surfaces: 1,
+            azimuth_rad: 0.0,
+            specular_share: seen.specular_share,
+            coherent_share: seen.coherent_share,
+        }
+    }
+
     fn surfaces(&self) -> Surfaces {
         (self.pieces, self.surfaces, self.sheets)
     }

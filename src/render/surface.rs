@@ -56,14 +56,6 @@ impl<'a> Surface<'a> {
         let widening_rad = self.widening_rad(beam_rad);
         Seen { f_per_sr: self.scattering.seen_by(widening_rad, i, o).f_per_sr, ..seen }
     }
-
-    /// Whether it returns a tenth of its echo or more in one wave to a beam of a divergence, rad, that faces it. A smaller
-    /// part K of the rest changes the contrast of the speckle by K²/2, less than 0.5 %.
-    pub(super) fn returns_wave(&self, beam_rad: f64) -> bool {
-        const LEAST: f64 = 0.1;
-        let facing = Direction::from_angles(0.0, 0.0);
-        self.seen_by(beam_rad, facing, facing).coherent_share >= LEAST
-    }
 }
 
 /// The orientation of the surface at a hit on a target that effects have moved.

@@ -25,7 +25,7 @@ mod wide;
 
 pub use bvh::Bvh;
 pub use gpu::{Answer, Gpu, GpuError, GpuMesh};
-pub(crate) use gpu::{Cone, EchoTracer, RAYS_PER_SHARE, Share};
+pub(crate) use gpu::{Cone, EchoTracer, Piece, RAYS_PER_SHARE, Share};
 pub use hit::Hit;
 pub use inside::winding_number;
 pub use local_frame::LocalFrame;

@@ -36,7 +36,7 @@ pub(super) struct Tree {
 
 /// The scattering models on a tree and the samples of a spot, in the device's memory.
 pub(super) struct Table {
-    regions: wgpu::Buffer,
+    places: wgpu::Buffer,
     samples: wgpu::Buffer,
     laws: wgpu::Buffer,
     terms: wgpu::Buffer,
@@ -137,13 +137,13 @@ impl Device {
     /// Copies the region of each leaf entry, the samples of a spot, and the scattering models with their terms.
     pub fn table(
         &self,
-        regions: &[u32],
+        places: &[[u32; 2]],
         samples: &[[f32; 2]],
         laws: &[[u32; 2]],
         terms: &[[u32; 4]],
     ) -> Result<Table, GpuError> {
         let parts: [&[u8]; 4] = [
-            bytemuck::cast_slice(regions),
+            bytemuck::cast_slice(places),
             bytemuck::cast_slice(samples),
             bytemuck::cast_slice(laws),
             bytemuck::cast_slice(terms),
@@ -153,8 +153,8 @@ impl Device {
             let (adapter, most) = (self.adapter.clone(), self.most);
             return Err(GpuError::TooMany { adapter, needed, most });
         }
-        let [regions, samples, laws, terms] = parts.map(|part| self.filled(part));
-        let table = Table { regions: regions?, samples: samples?, laws: laws?, terms: terms? };
+        let [places, samples, laws, terms] = parts.map(|part| self.filled(part));
+        let table = Table { places: places?, samples: samples?, laws: laws?, terms: terms? };
         self.check_trouble().map(|()| table)
     }
 
@@ -165,7 +165,7 @@ impl Device {
         self.start(&self.closest, &given, aims.len() as u64, 1)
     }
 
-    /// Launches the sums of echoes: three words per share of each chirp.
+    /// Launches the sums of echoes: five words per share of each chirp.
     pub fn launch_echoes(
         &self,
         tree: &Tree,
@@ -177,13 +177,13 @@ impl Device {
         let given = [
             (0, &tree.nodes),
             (1, &tree.corners),
-            (4, &table.regions),
+            (4, &table.places),
             (5, &chirps),
             (6, &table.samples),
             (7, &table.laws),
             (8, &table.terms),
         ];
-        self.start(&self.echo, &given, spots.len() as u64 * shares, 3)
+        self.start(&self.echo, &given, spots.len() as u64 * shares, 5)
     }
 
     /// Launches `invocations` of a shader that write `words` each.
@@ -319,17 +319,21 @@ mod tests {
         let tree = device.hold(&[EMPTY], &[POINT]).unwrap();
         let answers = device.land(device.launch(&tree, &[[7; 8], [9; 8]]).unwrap()).unwrap();
         assert_eq!(answers, [7, 9], "what is known is not asked");
-        let table = device.table(&[0], &[[0.0; 2]], &[[0; 2]], &[[0; 4]]).unwrap();
+        let table = device.table(&[[0, 0]], &[[0.0; 2]], &[[0; 2]], &[[0; 4]]).unwrap();
         let spots = [[u32::MAX; 24]];
         let echoes = device.launch_echoes(&tree, &table, &spots, 1).unwrap();
-        assert_eq!(device.land(echoes).unwrap(), [0; 3], "what is known is not asked");
+        assert_eq!(
+            device.land(echoes).unwrap(),
+            [0, 0, 0, 0, u32::MAX],
+            "what is known is not asked"
+        );
         let flight = device.launch(&tree, &[[7; 8]]).unwrap();
         device.device.destroy();
         // What was under way may still arrive.
         device.land(flight).map_or_else(lost, |answers| assert_eq!(answers, [7]));
         lost(device.launch(&tree, &[[7; 8]]).err().unwrap());
         lost(device.launch_echoes(&tree, &table, &spots, 1).err().unwrap());
-        lost(device.table(&[0], &[[0.0; 2]], &[[0; 2]], &[[0; 4]]).err().unwrap());
+        lost(device.table(&[[0, 0]], &[[0.0; 2]], &[[0; 2]], &[[0; 4]]).err().unwrap());
         lost(device.hold(&[EMPTY], &[POINT]).err().unwrap());
     }
 

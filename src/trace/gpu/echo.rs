@@ -25,6 +25,10 @@ const FACETS: u32 = 16;
 /// Number of terms that marks a scattering model without terms, as in the shader.
 const NO_TERMS: u32 = u32::MAX;
 
+/// In place of the number of a smooth piece, as in the shader: rays that do not all lie on one, and no ray at all.
+const NO_PIECE: u32 = u32::MAX;
+const ANY_PIECE: u32 = u32::MAX - 1;
+
 /// The sums over up to [`RAYS_PER_SHARE`] rays of a chirp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Share {
@@ -34,6 +38,48 @@ pub struct Share {
     pub per_sr: f64,
     /// Sum of R·f·cosᵃθ·Ω(R)/level over the other rays, m/sr.
     pub m_per_sr: f64,
+    /// The part of `per_sr` that is coherent, 1/sr.
+    pub coherent_per_sr: f64,
+    /// Where the other rays lie.
+    pub piece: Piece,
+}
+
+/// Which smooth piece of a mesh some rays lie on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Piece {
+    /// There are no rays.
+    Any,
+    /// All lie on one, by its number.
+    One(u32),
+    /// They lie on several, or some miss the mesh.
+    Several,
+}
+
+impl Piece {
+    /// Where these rays and others lie.
+    pub fn and(self, other: Piece) -> Piece {
+        match (self, other) {
+            (Piece::Any, piece) | (piece, Piece::Any) => piece,
+            (own, other) if own == other => own,
+            _ => Piece::Several,
+        }
+    }
+
+    fn of_word(word: u32) -> Piece {
+        match word {
+            ANY_PIECE => Piece::Any,
+            NO_PIECE => Piece::Several,
+            number => Piece::One(number),
+        }
+    }
+}
+
+impl Share {
+    /// Rays that all miss the target.
+    pub const DARK: Share =
+        Share { open: 0, per_sr: 0.0, m_per_sr: 0.0, coherent_per_sr: 0.0, piece: Piece::Several };
+    /// A share of which the CPU must compute all rays.
+    pub const OPEN: Share = Share { open: u32::MAX, piece: Piece::Any, ..Share::DARK };
 }
 
 /// A mesh in the memory of a graphics processor, with its scattering models and the samples of a spot.
@@ -47,23 +93,26 @@ pub struct EchoTracer<'a> {
 }
 
 impl GpuMesh<'_> {
-    /// Prepares the mesh for echoes: the region of every facet, the scattering model of every region of every scan as
-    /// terms, a power of cos θ by which all terms are multiplied, and the samples of a spot, one or more.
+    /// Prepares the mesh for echoes: the region and the smooth piece of every facet, where pieces matter, the scattering model
+    /// of every region of every scan as terms, a power of cos θ by which all terms are multiplied, and the samples of a spot, one or more.
     pub(crate) fn echo_tracer(
         &self,
         region_of_facet: &[u16],
+        piece_of_facet: &[u32],
         laws: &[Option<Vec<Term>>],
         cosines: f64,
         samples: &[DVec2],
     ) -> Result<EchoTracer<'_>, GpuError> {
         let table = || {
             let facets = &self.bvh.boxes().facets;
-            let regions: Vec<u32> =
-                facets.iter().map(|&facet| region_of_facet[facet as usize].into()).collect();
+            let place = |facet: usize| {
+                [region_of_facet[facet].into(), piece_of_facet.get(facet).copied().unwrap_or(0)]
+            };
+            let places: Vec<[u32; 2]> = facets.iter().map(|&facet| place(facet as usize)).collect();
             let samples: Vec<[f32; 2]> =
                 samples.iter().map(|sample| sample.as_vec2().to_array()).collect();
             let (laws, terms) = pack_laws(laws, cosines);
-            self.gpu.device.table(&regions, &samples, &laws, &terms)
+            self.gpu.device.table(&places, &samples, &laws, &terms)
         };
         Ok(EchoTracer {
             held: self,
@@ -85,7 +134,7 @@ impl EchoTracer<'_> {
         let GpuMesh { gpu, bvh, tree } = self.held;
         let shares = self.shares();
         let (Some(tree), Some(table)) = (tree, &self.table) else {
-            return Ok(vec![Share { open: 0, per_sr: 0.0, m_per_sr: 0.0 }; shares * cones.len()]);
+            return Ok(vec![Share::DARK; shares * cones.len()]);
         };
         let boxes = bvh.boxes();
         let most = RAYS_AT_ONCE / self.samples as u64;
@@ -97,20 +146,22 @@ impl EchoTracer<'_> {
         let mut all = Vec::with_capacity(shares * cones.len());
         pipeline(cones, at_once, launch, |_, flight| {
             let words = gpu.device.land(flight)?;
-            all.extend(words.chunks_exact(3).map(|words| share(words, boxes.sphere.radius_m)));
+            all.extend(words.chunks_exact(5).map(|words| share(words, boxes.sphere.radius_m)));
             Ok(())
         })?;
         Ok(all)
     }
 }
 
-/// Unpacks the three words of a share. All rays are left open if a sum is not finite.
+/// Unpacks the five words of a share. All rays are left open if a sum is not finite.
 fn share(words: &[u32], radius_m: f64) -> Share {
-    let [power, moment] = [words[1], words[2]].map(|word| f64::from(f32::from_bits(word)));
-    if !power.is_finite() || !moment.is_finite() {
-        return Share { open: u32::MAX, per_sr: 0.0, m_per_sr: 0.0 };
+    let sums = [words[1], words[2], words[3]].map(|word| f64::from(f32::from_bits(word)));
+    if sums.iter().any(|sum| !sum.is_finite()) {
+        return Share::OPEN;
     }
-    Share { open: words[0], per_sr: power, m_per_sr: moment * radius_m }
+    let [per_sr, moment, coherent_per_sr] = sums;
+    let m_per_sr = moment * radius_m;
+    Share { open: words[0], per_sr, m_per_sr, coherent_per_sr, piece: Piece::of_word(words[4]) }
 }
 
 /// Packs scattering models: first term and number of terms of each, and all terms. Neither list is empty.
@@ -245,7 +296,8 @@ mod tests {
         let terms: Vec<_> = laws.iter().map(Scattering::backscatter).collect();
         let samples: Vec<DVec2> =
             (0..50).map(|i| 0.14 * f64::from(i).sqrt() * DVec2::from_angle(f64::from(i))).collect();
-        let lit = held.echo_tracer(&vec![0; ball.facets.len()], &terms, 2.0, &samples).unwrap();
+        let lit =
+            held.echo_tracer(&vec![0; ball.facets.len()], &[], &terms, 2.0, &samples).unwrap();
         let cones = cones(2000);
         let shares = lit.echoes(&cones).unwrap();
         assert_eq!((lit.shares(), shares.len()), (2, 4000));
@@ -274,7 +326,7 @@ mod tests {
         let term = |facets, cosines| Some(vec![Term { level_per_sr: 1.0, cosines, facets }]);
         let laws = [None, term(Some(narrow), 0.0), term(None, 1e4), term(None, 0.0)];
         let regions = vec![0; ball.facets.len()];
-        let lit = held.echo_tracer(&regions, &laws, 2.0, &[DVec2::ZERO]).unwrap();
+        let lit = held.echo_tracer(&regions, &[], &laws, 2.0, &[DVec2::ZERO]).unwrap();
         let origin = Point::new(0.013, 0.021, 5.0);
         let direction = Direction::new(DVec3::NEG_Z).unwrap();
         let of_law = |law| {
@@ -285,7 +337,7 @@ mod tests {
             lit.echoes(&[cone]).unwrap()[0]
         };
         for law in 0..3 {
-            assert_eq!(of_law(law), Share { open: 1, per_sr: 0.0, m_per_sr: 0.0 });
+            assert_eq!(of_law(law), Share { open: 1, piece: Piece::Any, ..Share::DARK });
         }
         let told = of_law(3);
         assert!(told.open == 0 && (told.m_per_sr / told.per_sr - 4.7).abs() < 0.02, "{told:?}");
@@ -293,8 +345,9 @@ mod tests {
         let plate = solids::plate(1.0, 1.0);
         let bvh = Bvh::new(&plate);
         let held = gpu.hold(&bvh).unwrap();
-        let lit =
-            held.echo_tracer(&vec![0; plate.facets.len()], &laws, 2.0, &[DVec2::ZERO]).unwrap();
+        let lit = held
+            .echo_tracer(&vec![0; plate.facets.len()], &[], &laws, 2.0, &[DVec2::ZERO])
+            .unwrap();
         let from = |height_m: f64, x_m: f64| {
             let origin = Point::new(x_m, 0.1, height_m);
             let direction = Direction::new(DVec3::new(-1.0, 0.03, -1e-3)).unwrap();

@@ -9,6 +9,8 @@
 // cos θ errs by 6 n, and the range, in radii, by 18 n over cos θ. The CPU computes the rays for which this matters.
 //
 // A power below the range of f32 becomes `LEAST`, so that there is an echo wherever f64 has one.
+//
+// Of a lobe of facets, the part that the beam's own width has in it is coherent.
 
 /// Least cos θ, and least cos θ times a range below 1, for which f32 gives the power within 0.02 dB.
 const GRAZING: f32 = 2e-3;
@@ -35,6 +37,10 @@ const UNSEEN: f32 = 1e-4;
 
 /// Number of terms of a scattering model without terms.
 const NO_TERMS: u32 = 0xffffffffu;
+
+/// In place of a smooth piece of the mesh: that of rays that meet nothing or do not all lie on one, and of no ray.
+const NO_PIECE: u32 = 0xffffffffu;
+const ANY_PIECE: u32 = 0xfffffffeu;
 
 const GGX: u32 = 1u;
 const SHADOWED: u32 = 6u;
@@ -81,7 +87,8 @@ struct Term {
     form: u32,
 }
 
-@group(0) @binding(4) var<storage, read> regions: array<u32>;
+/// Region and smooth piece of each facet.
+@group(0) @binding(4) var<storage, read> places: array<vec2u>;
 @group(0) @binding(5) var<storage, read> spots: array<Spot>;
 @group(0) @binding(6) var<storage, read> samples: array<vec2f>;
 /// First term and number of terms of each scattering model.
@@ -94,12 +101,25 @@ struct Beside {
     way: f32,
 }
 
-/// The echo of a ray: f cosᵃ θ times the antenna's solid angle over its level, and R in radii. `power` is negative if
-/// f32 cannot compute it.
+/// The echo of a ray: f cosᵃ θ times the antenna's solid angle over its level, the coherent part of that, and R in
+/// radii. `power` is negative if f32 cannot compute it.
 struct Back {
     power: f32,
+    in_phase: f32,
     range: f32,
+    piece: u32,
 }
+
+/// The part of a law that a term has, and the coherent part of it. `whole` is negative if f32 cannot decide whether the value
+/// is 0 in f64.
+struct Told {
+    whole: f32,
+    in_phase: f32,
+}
+
+const NOT_TOLD: Told = Told(-1.0, 0.0);
+const NO_ECHO: Back = Back(0.0, 0.0, 0.0, NO_PIECE);
+const OPEN: Back = Back(-1.0, 0.0, 0.0, NO_PIECE);
 
 @compute @workgroup_size(64)
 fn echo(@builtin(global_invocation_id) id: vec3u) {
@@ -114,6 +134,8 @@ fn echo(@builtin(global_invocation_id) id: vec3u) {
     var open = 0u;
     var power = 0.0;
     var moment = 0.0;
+    var in_phase = 0.0;
+    var piece = ANY_PIECE;
     for (var bit = 0u; bit < min(SHARE, count - first); bit++) {
         let back = came_back(spot, samples[first + bit]);
         if back.power < 0.0 {
@@ -121,11 +143,15 @@ fn echo(@builtin(global_invocation_id) id: vec3u) {
         } else {
             power += back.power;
             moment += back.power * back.range;
+            in_phase += back.in_phase;
+            piece = select(NO_PIECE, back.piece, piece == ANY_PIECE || piece == back.piece);
         }
     }
-    answers[3u * id.x] = open;
-    answers[3u * id.x + 1u] = bitcast<u32>(power);
-    answers[3u * id.x + 2u] = bitcast<u32>(moment);
+    answers[5u * id.x] = open;
+    answers[5u * id.x + 1u] = bitcast<u32>(power);
+    answers[5u * id.x + 2u] = bitcast<u32>(moment);
+    answers[5u * id.x + 3u] = bitcast<u32>(in_phase);
+    answers[5u * id.x + 4u] = piece;
 }
 
 fn came_back(spot: Spot, sample: vec2f) -> Back {
@@ -135,10 +161,10 @@ fn came_back(spot: Spot, sample: vec2f) -> Back {
         entry = answer(way.ray);
     }
     if entry == NOTHING {
-        return Back(0.0, 0.0);
+        return NO_ECHO;
     }
     if entry == UNSURE {
-        return Back(-1.0, 0.0);
+        return OPEN;
     }
     return scattered(spot, way, entry);
 }
@@ -171,33 +197,35 @@ fn scattered(spot: Spot, way: Beside, entry: u32) -> Back {
     let cosine = min(abs(towards) / unit, 1.0);
     let depth = dot(corner.xyz - ray.origin, normal) / towards;
     let range = way.way + unit * depth;
-    let law = laws[spot.law + regions[entry]];
+    let place = places[entry];
+    let law = laws[spot.law + place.x];
     if cosine < GRAZING || cosine * range < GRAZING || law.y == NO_TERMS {
-        return Back(-1.0, 0.0);
+        return OPEN;
     }
     // 1 - cos² θ would suffer from cancellation.
     let across = cross(ray.direction, normal) / unit;
     let tangent = sqrt(dot(across, across)) / cosine;
     let zeta = (range - spot.focus) * spot.per_rayleigh;
     let beam2 = spot.beam2 / (1.0 + zeta * zeta);
-    var sum = 0.0;
+    var sum = Told(0.0, 0.0);
     var is_told = true;
     for (var term = law.x; term < law.x + law.y; term++) {
         let one = told(terms[term], cosine, tangent, beam2);
-        is_told = is_told && one >= 0.0;
-        sum += max(one, 0.0);
+        is_told = is_told && one.whole >= 0.0;
+        sum.whole += max(one.whole, 0.0);
+        sum.in_phase += one.in_phase;
     }
-    if sum == 0.0 {
-        return Back(select(-1.0, 0.0, is_told), 0.0);
+    if sum.whole == 0.0 {
+        return Back(select(-1.0, 0.0, is_told), 0.0, 0.0, place.y);
     }
     let depths = (range - spot.middle) * spot.per_depth;
-    return Back(max(sum / (spot.offset + depths * depths), LEAST), range);
+    let falloff = spot.offset + depths * depths;
+    return Back(max(sum.whole / falloff, LEAST), sum.in_phase / falloff, range, place.y);
 }
 
-/// Negative if f32 cannot decide whether the value is 0 in f64.
-fn told(term: Term, cosine: f32, tangent: f32, beam2: f32) -> f32 {
+fn told(term: Term, cosine: f32, tangent: f32, beam2: f32) -> Told {
     if term.level == 0.0 {
-        return 0.0;
+        return Told(0.0, 0.0);
     }
     let is_diffuse = (term.form & FACETS) == 0u;
     let is_ggx = (term.form & GGX) == GGX;
@@ -208,7 +236,7 @@ fn told(term: Term, cosine: f32, tangent: f32, beam2: f32) -> f32 {
     let includes_beam = (term.form & INCLUDES_BEAM) != 0u;
     let m2 = max(term.m * term.m - select(0.0, beam2, includes_beam), 0.0);
     if !is_diffuse && m2 + beam2 < LEAST_WIDTH2 {
-        return -1.0;
+        return NOT_TOLD;
     }
     let lost = select(
         select(slope2 / (m2 + beam2), 0.0, is_ggx),
@@ -216,14 +244,14 @@ fn told(term: Term, cosine: f32, tangent: f32, beam2: f32) -> f32 {
         is_diffuse,
     );
     if lost > GONE {
-        return 0.0;
+        return Told(0.0, 0.0);
     }
     if lost > FAINT {
-        return -1.0;
+        return NOT_TOLD;
     }
     let level = term.level * pow(cosine, cosines);
     if is_diffuse {
-        return max(level / (1.0 + widened), LEAST);
+        return Told(max(level / (1.0 + widened), LEAST), 0.0);
     }
     var law = exp(-lost) / (m2 + beam2);
     if is_ggx {
@@ -232,7 +260,8 @@ fn told(term: Term, cosine: f32, tangent: f32, beam2: f32) -> f32 {
     let seen = select(seen_beckmann(term.m * tangent), seen_ggx(term.m * tangent), is_ggx);
     let shadowed = (term.form & SHADOWED) >> 1u;
     let together = select(1.0, seen, shadowed >= 1u) * select(1.0, seen, shadowed >= 2u);
-    return max(level * law * together, LEAST);
+    let whole = max(level * law * together, LEAST);
+    return Told(whole, whole * beam2 / (term.m * term.m + beam2));
 }
 
 /// π times GGX's density of slopes as the beam widens it: `Distribution::density` of slopes.rs.

@@ -22,7 +22,7 @@ mod error;
 mod mesh;
 mod packed;
 
-pub use echo::{EchoTracer, RAYS_PER_SHARE, Share};
+pub use echo::{EchoTracer, Piece, RAYS_PER_SHARE, Share};
 pub use error::GpuError;
 pub use mesh::{Answer, Gpu, GpuMesh};
 pub use packed::Cone;
