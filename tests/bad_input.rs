@@ -444,7 +444,17 @@ fn instruments_that_cannot_work() {
             (0..33).map(|n| left.replace("left", &format!("r{n}"))).collect(),
             &["33 receivers", "at most 32"],
         ),
-        (left.replace("[-2, 1.1, 7]", "[0, 1.1, 0]").replace("left", "in"), &["inside the target"]),
+        (
+            left.replace("[-2, 1.1, 7]", "[0, 1.1, 0]").replace("left", "in"),
+            &["the receiver", "inside the target", "position_m"],
+        ),
+        (
+            format!(
+                "[[mesh]]\nname = \"case\"\nfile = \"builtin:cuboid\"\nsize_m = [1, 1, 1]\n\
+                     translation_m = [0, 1.1, 8]\n{left}"
+            ),
+            &["the radar at", "inside the target", "reflector_centre_m"],
+        ),
     ] {
         // A solid, so that it has an inside.
         let scene = with(&more)

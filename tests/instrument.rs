@@ -290,6 +290,19 @@ fn an_obstacle_shades_a_receiver_and_not_the_radar() {
 }
 
 #[test]
+fn files_of_an_antenna_that_is_gone_are_named() {
+    let receiver = "[[receiver]]\nname = \"beside\"\nposition_m = [4, 1.1, 7]\n[[region]]";
+    let (folder, _) = rendered(&PLATE.replace("[[region]]", receiver));
+    fs::write(folder.path().join("scene.toml"), PLATE).unwrap();
+    fs::write(folder.path().join("out/notes.txt"), "mine").unwrap();
+    let again = matdb(folder.path()).args(["render", "scene.toml", "-o", "out"]).output().unwrap();
+    let notes = String::from_utf8(again.stderr).unwrap();
+    let left = "out also holds cloud-beside.ply, power-beside.exr, power-beside.png of another rendering; \
+                delete what you do not need";
+    assert!(again.status.success() && notes.contains(left), "{notes}");
+}
+
+#[test]
 fn the_cloud_knows_azimuth_edges_and_shares_of_a_plate() {
     // A plate of 0.2 m, turned by 30° about the upright axis, so that the radar stands at 90° from an
     // upright grain.

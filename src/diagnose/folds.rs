@@ -7,6 +7,11 @@ use std::collections::BTreeMap;
 use crate::effects::Shot;
 use crate::fit::held_out::deal;
 
+/// Cells on a side of a patch, over which standard errors are taken.
+const CELLS: f64 = 3.0;
+/// The same where neighbours share speckle.
+const CELLS_OF_SHARED: f64 = 2.0;
+
 /// A scan in patches, and the patches in folds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Folds {
@@ -18,7 +23,7 @@ pub struct Folds {
     pub blocks: usize,
     /// Number of folds.
     pub folds: usize,
-    /// Cell of every shot, a third as wide as a patch.
+    /// Cell of every shot, narrower than a patch.
     cell: Vec<usize>,
     /// Number of cells.
     cells: usize,
@@ -27,6 +32,21 @@ pub struct Folds {
 impl Folds {
     /// Square patches of side `block_m`, m, dealt out to `folds` folds of about equal numbers of shots.
     pub fn new(shots: &[Shot], block_m: f64, folds: usize, seed: u64) -> Folds {
+        Folds::with_cells(shots, block_m, folds, seed, CELLS)
+    }
+
+    /// As [`new`](Self::new), for shots that share speckle, whose standard errors need wider cells.
+    pub(super) fn of_shared(shots: &[Shot], block_m: f64, folds: usize, seed: u64) -> Folds {
+        Folds::with_cells(shots, block_m, folds, seed, CELLS_OF_SHARED)
+    }
+
+    fn with_cells(
+        shots: &[Shot],
+        block_m: f64,
+        folds: usize,
+        seed: u64,
+        cells_per_side: f64,
+    ) -> Folds {
         let folds = folds.max(2);
         let side_m = block_m.max(1e-6);
         let mut members: BTreeMap<[i64; 2], Vec<usize>> = BTreeMap::new();
@@ -47,7 +67,7 @@ impl Folds {
         let mut cell = Vec::with_capacity(shots.len());
         for shot in shots {
             let next = numbers.len();
-            cell.push(*numbers.entry(square(shot, side_m / 3.0)).or_insert(next));
+            cell.push(*numbers.entry(square(shot, side_m / cells_per_side)).or_insert(next));
         }
         Folds { block, fold, blocks: members.len(), folds, cell, cells: numbers.len() }
     }

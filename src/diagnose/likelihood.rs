@@ -7,6 +7,7 @@
 //! costs a bounded amount.
 
 use super::observation::{Observation, ReceiverLimits};
+use super::shared::SharedSpeckle;
 use crate::effects::{MeanEcho, Prediction};
 use crate::fit::gamma_law::{GammaLaw, LnProbability};
 
@@ -30,6 +31,7 @@ const NOTHING: f64 = 1e-9;
 pub(super) struct Likelihood<'a> {
     prediction: &'a Prediction,
     declared: ReceiverLimits,
+    shared: &'a SharedSpeckle,
     law: GammaLaw,
 }
 
@@ -52,11 +54,18 @@ pub(super) struct Term {
     pub range_slope: f64,
     /// −d² ln p/d range², 1/m², never negative.
     pub range_bend: f64,
+    /// Share of an independent observation that its power is. What is said of the power is multiplied by it.
+    pub weight: f64,
 }
 
 impl<'a> Likelihood<'a> {
-    pub fn new(prediction: &'a Prediction, declared: ReceiverLimits) -> Likelihood<'a> {
-        Likelihood { prediction, declared, law: GammaLaw::new(prediction.receiver.looks) }
+    pub fn new(
+        prediction: &'a Prediction,
+        declared: ReceiverLimits,
+        shared: &'a SharedSpeckle,
+    ) -> Likelihood<'a> {
+        let law = GammaLaw::new(prediction.receiver.looks);
+        Likelihood { prediction, declared, shared, law }
     }
 
     /// ln of the mean power of a shot with thermal noise, and its weight, for every tilt.
@@ -97,15 +106,17 @@ impl<'a> Likelihood<'a> {
         let range_m = arrived.map_or(0.0, |arrived| arrived.range_m);
         let ranged = arrived.and_then(|arrived| self.range(&arrived, seen));
         let [ln_range, range_slope, range_bend] = ranged.unwrap_or_default();
+        let weight = self.shared.weight(shot);
         Term {
-            ln_p: p.ln() + ln_range,
+            ln_p: weight * p.ln() + ln_range,
             ln_mean: ln_mean - lost,
-            slope: slope / p,
-            pull,
-            bend: bend / p,
+            slope: weight * slope / p,
+            pull: weight * pull,
+            bend: weight * bend / p,
             range_m,
             range_slope,
             range_bend,
+            weight,
         }
     }
 

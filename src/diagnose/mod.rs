@@ -12,7 +12,7 @@
 //! |---|---|
 //! | from a scene and its cloud to a report | `scan.rs`, `run.rs` |
 //! | every chirp against the target, the cloud against the chirps | `shots.rs`, `matching.rs` |
-//! | probability of the observations | `likelihood.rs`, `problem.rs` |
+//! | probability of the observations | `likelihood.rs`, `problem.rs`, `shared.rs` |
 //! | scattering models and effects together | `space.rs`, `refit.rs`, `ranges.rs` |
 //! | the promise of an effect | `screen.rs` |
 //! | the score of a model on held-out patches | `folds.rs`, `score.rs`, `scorer.rs` |
@@ -51,6 +51,7 @@ mod score;
 mod scorer;
 mod screen;
 mod settings;
+mod shared;
 mod shots;
 mod size;
 mod space;

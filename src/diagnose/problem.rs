@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::likelihood::{Likelihood, Term};
 use super::observation::{Observation, ReceiverLimits};
+use super::shared::SharedSpeckle;
 use super::space::Space;
 use crate::effects::{Model, Prediction, PredictionCache, Receiver, Shot, Stage};
 
@@ -25,6 +26,8 @@ pub(super) struct Problem<'a> {
     pub observations: &'a [Observation],
     pub declared: ReceiverLimits,
     pub receiver: Receiver,
+    /// How much of its speckle each shot has to itself.
+    pub shared: &'a SharedSpeckle,
     /// Rays already traced for these shots.
     pub traced: &'a PredictionCache,
 }
@@ -47,7 +50,7 @@ impl Problem<'_> {
 
     fn terms_of(&self, model: &Model) -> Vec<Term> {
         let prediction = model.predict_with(self.stage, self.shots, self.traced);
-        let likelihood = Likelihood::new(&prediction, self.declared);
+        let likelihood = Likelihood::new(&prediction, self.declared, self.shared);
         let seen = self.observations.par_iter().enumerate();
         seen.map(|(shot, seen)| likelihood.term(shot, seen)).collect()
     }
@@ -179,6 +182,7 @@ pub(super) fn ln_likelihood(terms: &[Term]) -> f64 {
 pub(super) struct Sample {
     shots: Vec<Shot>,
     observations: Vec<Observation>,
+    shared: SharedSpeckle,
     traced: PredictionCache,
     /// Shots of the scan per shot of the sample.
     pub weight: f64,
@@ -191,12 +195,13 @@ impl Sample {
         let shots: Vec<Shot> = problem.shots.iter().step_by(every).copied().collect();
         let observations = problem.observations.iter().step_by(every).copied().collect();
         let weight = problem.shots.len() as f64 / shots.len().max(1) as f64;
-        Sample { shots, observations, traced: PredictionCache::default(), weight }
+        let (shared, traced) = (problem.shared.step_by(every), PredictionCache::default());
+        Sample { shots, observations, shared, traced, weight }
     }
 
     /// The problem of the sample alone.
     pub fn problem<'a>(&'a self, whole: &Problem<'a>) -> Problem<'a> {
-        let Sample { shots, observations, traced, .. } = self;
-        Problem { shots, observations, traced, ..*whole }
+        let Sample { shots, observations, shared, traced, .. } = self;
+        Problem { shots, observations, shared, traced, ..*whole }
     }
 }

@@ -37,7 +37,8 @@ pub(super) fn recover(search: &Search, base: &State, effect: &dyn Effect) -> Pow
     let problem = Problem { traced, ..search.sample.problem(&search.scorer.problem) };
     let settings = search.scorer.settings;
     let Diagnosis { block_m, folds, seed, .. } = *settings;
-    let folds = &Folds::new(problem.shots, block_m, folds, seed);
+    let make = if problem.shared.is_any() { Folds::of_shared } else { Folds::new };
+    let folds = &make(problem.shots, block_m, folds, seed);
     let scorer = Scorer { problem, folds, settings };
     Bench { scorer, weight: search.sample.weight, base, effect }.power()
 }

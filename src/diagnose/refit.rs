@@ -148,14 +148,23 @@ impl Problem<'_> {
     /// Standard deviation of every unknown; infinite where a bound holds it or the data do not determine it.
     pub fn sd(&self, space: &Space, at: &DVector<f64>) -> Vec<f64> {
         let [lower, upper] = space.bounds();
-        let slopes = self.slopes(space, at, [&lower, &upper], &self.terms(space, at));
+        let terms = self.terms(space, at);
+        let slopes = self.slopes(space, at, [&lower, &upper], &terms);
         let free: Vec<usize> =
             (0..at.len()).filter(|&i| at[i] > lower[i] && at[i] < upper[i]).collect();
+        // Powers that share speckle count for less, ranges do not. Without it both are one score.
+        let product = |(term, (a, b)): (&Term, (&Slope, &Slope))| {
+            if term.weight == 1.0 {
+                return a.ln_p * b.ln_p;
+            }
+            let [in_range_a, in_range_b] = [a, b].map(|slope| term.range_slope * slope.range_m);
+            (a.ln_p - in_range_a) * (b.ln_p - in_range_b) / term.weight + in_range_a * in_range_b
+        };
         let mut products: DMatrix<f64> = DMatrix::zeros(free.len(), free.len());
         for (row, &i) in free.iter().enumerate() {
             for (column, &j) in free.iter().enumerate() {
                 let pairs = slopes[i].iter().zip(&slopes[j]);
-                products[(row, column)] = pairs.map(|(a, b)| a.ln_p * b.ln_p).sum();
+                products[(row, column)] = terms.iter().zip(pairs).map(product).sum();
             }
         }
         let mut sd = vec![f64::INFINITY; at.len()];
@@ -193,7 +202,7 @@ fn local(terms: &[Term], slopes: &[Vec<Slope>], counts: impl Fn(usize) -> bool) 
                 laws[index] = slope.ln_p;
             }
         }
-        for (row, weight) in rows.iter().zip([term.bend, term.range_bend, 1.0]) {
+        for (row, weight) in rows.iter().zip([term.bend, term.range_bend, term.weight.recip()]) {
             sum.add(0.0, weight, row);
         }
     }

@@ -25,7 +25,7 @@ pub(super) struct Remainder<'a> {
 /// Every structure that exceeds chance, strongest first.
 pub(super) fn find_unexplained(scorer: &Scorer, remainder: &Remainder) -> Vec<ResidualStructure> {
     let Remainder { prediction, z, structure, largest_db, off_target } = *remainder;
-    let Problem { shots, observations, declared, .. } = scorer.problem;
+    let Problem { shots, observations, declared, shared, .. } = scorer.problem;
     let covariates = covariates(shots, prediction, observations);
     let tests = tests(scorer.settings, largest_db);
     let mut found = tests.run(z, shots, prediction, &covariates, scorer.folds);
@@ -38,7 +38,7 @@ pub(super) fn find_unexplained(scorer: &Scorer, remainder: &Remainder) -> Vec<Re
     }
     found.extend(residual::outliers(z, prediction, declared, observations, off_target));
     found.extend(residual::steps(observations));
-    found.extend(residual::skewness(z, speckle_sd_db(prediction.receiver.looks)));
+    found.extend(residual::skewness(z, shared, speckle_sd_db(prediction.receiver.looks)));
     found.sort_by(|a, b| b.strength_db.total_cmp(&a.strength_db));
     found
 }

@@ -7,6 +7,7 @@
 
 use std::collections::HashMap;
 use std::f64::consts::SQRT_2;
+use std::ops::Range;
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -18,6 +19,7 @@ use super::folds::{Folds, square};
 use super::likelihood::Likelihood;
 use super::observation::{Observation, ReceiverLimits};
 use super::score::DB;
+use super::shared::{ALONE, SharedSpeckle};
 use crate::effects::{Prediction, Shot};
 use crate::radar::random::{Key, Purpose};
 
@@ -56,7 +58,7 @@ pub(super) fn z(
     observations: &[Observation],
     seed: u64,
 ) -> Vec<f64> {
-    let likelihood = Likelihood::new(prediction, declared);
+    let likelihood = Likelihood::new(prediction, declared, &ALONE);
     let mut all = Vec::with_capacity(observations.len());
     for (shot, seen) in observations.iter().enumerate() {
         let level_w = seen.power_w.unwrap_or(declared.threshold_w);
@@ -77,22 +79,22 @@ pub(super) fn speckle_sd_db(looks: f64) -> f64 {
 /// The residual that neighbouring shots share, though their noise is independent: the root mean square of a
 /// structure too fine for any field, dB, and its probability by chance.
 ///
-/// Neighbours are one to two spots apart, beyond the correlation of speckle in overlapping spots.
+/// Neighbours are one to two spots apart, or as much farther as they share speckle.
 pub(super) fn of_neighbours(
     z: &[f64],
     shots: &[Shot],
-    spot_m: f64,
+    apart_m: Range<f64>,
     sd_db: f64,
     folds: &Folds,
 ) -> ResidualStructure {
     let mut members: HashMap<[i64; 2], Vec<usize>> = HashMap::new();
     for (index, shot) in shots.iter().enumerate() {
-        members.entry(square(shot, 2.0 * spot_m)).or_default().push(index);
+        members.entry(square(shot, apart_m.end)).or_default().push(index);
     }
     let products: Vec<f64> = shots
         .par_iter()
         .zip(z)
-        .map(|(shot, z_here)| match sum_over_neighbours(shot, z, shots, spot_m, &members) {
+        .map(|(shot, z_here)| match sum_over_neighbours(shot, z, shots, &apart_m, &members) {
             Some((sum, count)) => z_here * sum / count,
             None => 0.0,
         })
@@ -104,21 +106,21 @@ pub(super) fn of_neighbours(
     ResidualStructure { covariate: "neighbourhood".to_owned(), strength_db, p_value }
 }
 
-/// Sum and number of the residuals one to two spots from a shot; `None` where there are none.
+/// Sum and number of the residuals in a ring about a shot; `None` where there are none.
 fn sum_over_neighbours(
     shot: &Shot,
     z: &[f64],
     shots: &[Shot],
-    spot_m: f64,
+    ring_m: &Range<f64>,
     members: &HashMap<[i64; 2], Vec<usize>>,
 ) -> Option<(f64, f64)> {
-    let [i, j] = square(shot, 2.0 * spot_m);
+    let [i, j] = square(shot, ring_m.end);
     let (mut sum, mut count) = (0.0, 0.0);
     for (di, dj) in (-1..=1).flat_map(|di| (-1..=1).map(move |dj| (di, dj))) {
         for &index in members.get(&[i + di, j + dj]).into_iter().flatten() {
             let (Some(other), Some(z)) = (shots.get(index), z.get(index)) else { continue };
             let apart_m = (other.xt_m - shot.xt_m).hypot(other.yt_m - shot.yt_m);
-            if (spot_m..2.0 * spot_m).contains(&apart_m) {
+            if ring_m.contains(&apart_m) {
                 sum += z;
                 count += 1.0;
             }
@@ -178,14 +180,14 @@ pub(super) fn outliers(
 
 /// Scatter of another shape than declared, such as a speckle that is not Gamma: z is skewed
 /// although mean and spread are right. Its third moment is 0 under the model, with the standard
-/// deviation √(6/n); the corresponding displacement is (z² − 1)/6 of it (Cornish and Fisher).
-pub(super) fn skewness(z: &[f64], sd_db: f64) -> Option<ResidualStructure> {
+/// deviation √(6/n) for n independent shots; the corresponding displacement is (z² − 1)/6 of it (Cornish and Fisher).
+pub(super) fn skewness(z: &[f64], shared: &SharedSpeckle, sd_db: f64) -> Option<ResidualStructure> {
     // Single shots far out count as outliers.
     let inner: Vec<f64> = z.iter().map(|z| z.clamp(-SKEWED_REACH, SKEWED_REACH)).collect();
     let count = inner.len().max(1) as f64;
     let mean = inner.iter().sum::<f64>() / count;
     let third = inner.iter().map(|z| (z - mean).powi(3)).sum::<f64>() / count;
-    let chance = erfc(third.abs() / (6.0 / count).sqrt() / SQRT_2);
+    let chance = erfc(third.abs() / (6.0 / shared.count(z.len())).sqrt() / SQRT_2);
     (third.abs() > SKEWED && chance < SKEWED_BY_CHANCE).then(|| ResidualStructure {
         covariate: "form of the scatter".to_owned(),
         strength_db: sd_db * SQRT_2 * third.abs() / 6.0,
@@ -238,10 +240,10 @@ mod tests {
             let key = Key { seed: 4, chirp: shot, sub_ray: 9, purpose: Purpose::Fit };
             normal.push(key.draws().gaussian());
         }
-        assert_eq!(skewness(&normal, 2.0), None);
+        assert_eq!(skewness(&normal, &ALONE, 2.0), None);
         // About as skewed as ln y of a Gamma distribution of 8 looks: the third moment is six times 0.06.
         let bent: Vec<f64> = normal.iter().map(|z| z - 0.06 * (z * z - 1.0)).collect();
-        let found = skewness(&bent, 2.0).unwrap();
+        let found = skewness(&bent, &ALONE, 2.0).unwrap();
         assert!((found.strength_db - 2.0 * 2f64.sqrt() * 0.06).abs() < 0.03, "{found:?}");
     }
 }

@@ -14,6 +14,7 @@ use super::residual;
 use super::score::Errors;
 use super::scorer::{Scorer, State, with_wide_speckle};
 use super::settings::Diagnosis;
+use super::shared::ALONE;
 use super::space::Space;
 use super::subject::Subject;
 use super::trial::Search;
@@ -46,17 +47,25 @@ impl Diagnosis {
     ) -> Result<Report, DiagnoseError> {
         let Subject { stage, laws, at_work, receiver, declared, .. } = *subject;
         let Subject { shots, observations, .. } = *subject;
-        let folds = &Folds::new(shots, self.block_m, self.folds, self.seed);
-        subject.check(folds)?;
+        let (block_m, folds, seed) = (self.block_m, self.folds, self.seed);
+        let independent = &Folds::new(shots, block_m, folds, seed);
+        subject.check(independent)?;
         let traced = &PredictionCache::default();
-        let problem = Problem { stage, shots, observations, declared, receiver, traced };
-        let sample = &Sample::new(&problem);
-        let scorer = Scorer { problem, folds, settings: self };
-        let search = Search { scorer, sample, notify };
+        let shared = &ALONE;
+        let alone = Problem { stage, shots, observations, declared, receiver, shared, traced };
+        let scorer = Scorer { problem: alone, folds: independent, settings: self };
 
         notify("refitting the scattering models");
-        let base = scorer.base(sample, Space::new(shots, receiver.looks, laws, at_work)?);
+        let space = Space::new(shots, receiver.looks, laws, at_work)?;
+        let base = scorer.base(&Sample::new(&alone), space);
         refuse_another_target(&scorer, &base)?;
+        let shared = &scorer.shared_speckle(&base);
+        let problem = Problem { shared, ..alone };
+        let folds = &Folds::of_shared(shots, block_m, folds, seed);
+        let folds = if shared.is_any() { folds } else { independent };
+        let (scorer, sample) = (Scorer { problem, folds, settings: self }, &Sample::new(&problem));
+        let base = if shared.is_any() { scorer.again(&base) } else { base };
+        let search = Search { scorer, sample, notify };
 
         let choice = choose_effects(&search, base.clone(), effects);
         let off_target = detections_off_target(&scorer, subject, &choice.model.state)?;

@@ -9,7 +9,9 @@ use statrs::function::gamma::ln_gamma;
 
 use super::folds::Folds;
 use super::likelihood::Likelihood;
-use super::observation::{Observation, ReceiverLimits};
+use super::observation::ReceiverLimits;
+use super::problem::Problem;
+use super::shared::ALONE;
 use crate::effects::Prediction;
 
 /// Errors below this multiple of the noise floor count as at the floor, with no excess to explain.
@@ -21,8 +23,10 @@ pub(super) const DB: f64 = 10.0 / std::f64::consts::LN_10;
 /// The score of a prediction at one shot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Score {
-    /// ln p.
+    /// ln p, as much as the shot counts.
     pub ln_p: f64,
+    /// ln p of the shot by itself.
+    pub whole_ln_p: f64,
     /// Geometric mean of the power of a detection, W: exp E[ln P | detected].
     pub expected_w: f64,
     /// Var[dB | detected].
@@ -117,12 +121,13 @@ fn moments_above(looks: f64, ln_threshold: f64) -> [f64; 2] {
 
 /// Scores of the shots that are `wanted`, with their numbers.
 pub(super) fn scores(
+    problem: &Problem,
     prediction: &Prediction,
-    declared: ReceiverLimits,
-    observations: &[Observation],
     wanted: impl Fn(usize) -> bool,
 ) -> Vec<(usize, Score)> {
-    let likelihood = Likelihood::new(prediction, declared);
+    let Problem { declared, observations, shared, .. } = *problem;
+    let likelihood = Likelihood::new(prediction, declared, shared);
+    let alone = Likelihood::new(prediction, declared, &ALONE);
     let table = MomentTable::new(prediction.receiver.looks);
     let mut scores = Vec::new();
     for (shot, seen) in observations.iter().enumerate().filter(|(shot, _)| wanted(*shot)) {
@@ -131,8 +136,10 @@ pub(super) fn scores(
         let share = seen
             .power_w
             .map(|power_w| (likelihood.below(shot, power_w) - missed) / (1.0 - missed).max(1e-300));
+        let ln_p = likelihood.term(shot, seen).ln_p;
         let score = Score {
-            ln_p: likelihood.term(shot, seen).ln_p,
+            ln_p,
+            whole_ln_p: if shared.is_any() { alone.term(shot, seen).ln_p } else { ln_p },
             expected_w: mean.exp(),
             variance_db2: DB * DB * variance,
             residual_db: seen.power_w.map(|power_w| DB * (power_w.ln() - mean)),
@@ -181,7 +188,7 @@ pub(super) fn errors(scores: &[Score], folds: &Folds) -> Errors {
         rmse_se_db: square_se_db2 / (2.0 * square_db2.sqrt().max(f64::MIN_POSITIVE)),
         bias_db,
         bias_se_db: standard_error(scores, folds, |r| r - bias_db),
-        log_score: mean(scores.iter().map(|score| score.ln_p)),
+        log_score: mean(scores.iter().map(|score| score.whole_ln_p)),
         coverage_50: coverage(scores, 0.5),
         coverage_90: coverage(scores, 0.9),
         brier: mean(scores.iter().map(|score| {

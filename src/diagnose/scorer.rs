@@ -11,6 +11,7 @@ use super::refit::{Fit, SCOUT, SEARCH};
 use super::residual::{self, ResidualStructure, speckle_sd_db};
 use super::score::{Errors, Score, errors, scores};
 use super::settings::Diagnosis;
+use super::shared::SharedSpeckle;
 use super::size::Size;
 use super::space::Space;
 use crate::effects::{Prediction, Receiver};
@@ -62,6 +63,12 @@ impl Scorer<'_> {
         self.state(space, fit)
     }
 
+    /// A model, refitted from where it is.
+    pub fn again<'a>(&self, state: &State<'a>) -> State<'a> {
+        let fit = self.problem.fit(&state.space, &state.fit.at, &[], &SEARCH);
+        self.state(state.space.clone(), fit)
+    }
+
     /// The model without one of its effects, refitted.
     pub fn without<'a>(&self, state: &State<'a>, index: usize) -> State<'a> {
         let (space, start) = state.space.without(&state.fit.at, index);
@@ -104,12 +111,11 @@ impl Scorer<'_> {
 
     /// Held-out scores with factors on the means, given by their logarithms.
     pub fn held_out_with(&self, space: &Space, at: &DVector<f64>, ln_factor: &[f64]) -> Vec<Score> {
-        let Problem { declared, observations, .. } = self.problem;
         let mut all: Vec<(usize, Score)> = Vec::new();
         for (fold, at) in self.problem.fit_without(space, at, self.folds).enumerate() {
             let prediction = scaled(self.problem.predict(space, &at), ln_factor);
             let is_held_out = |shot| self.folds.holds_out(fold, shot);
-            all.extend(scores(&prediction, declared, observations, is_held_out));
+            all.extend(scores(&self.problem, &prediction, is_held_out));
         }
         all.sort_by_key(|(shot, _)| *shot);
         all.into_iter().map(|(_, score)| score).collect()
@@ -152,8 +158,21 @@ impl Scorer<'_> {
     /// The residual that neighbours share.
     pub fn shared(&self, prediction: &Prediction, z: &[f64]) -> ResidualStructure {
         let sd_db = speckle_sd_db(prediction.receiver.looks);
-        let spot_m = self.problem.stage.geometry.radar.spot_fwhm_m();
-        residual::of_neighbours(z, self.problem.shots, spot_m, sd_db, self.folds)
+        let spot_m = self.spot_m();
+        let from_m = spot_m.max(self.problem.shared.reach_m);
+        let apart_m = from_m..from_m + spot_m;
+        residual::of_neighbours(z, self.problem.shots, apart_m, sd_db, self.folds)
+    }
+
+    /// The speckle that shots share beside a model.
+    pub fn shared_speckle(&self, state: &State) -> SharedSpeckle {
+        let z = self.z(&self.predict(state));
+        SharedSpeckle::of(&z, self.problem.observations, self.problem.shots, self.spot_m())
+    }
+
+    /// Diameter of the spot, m.
+    fn spot_m(&self) -> f64 {
+        self.problem.stage.geometry.radar.spot_fwhm_m()
     }
 
     /// The structure that a field finds beside a model.

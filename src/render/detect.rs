@@ -277,7 +277,12 @@ impl<'a> Detector<'a> {
             }
         };
         let power_w = self.saturation.passed_w(mean.power_w + law.noise_w, linear_w);
-        let error_m = noise.range_sd_m * self.draws(chirp, number, Purpose::Range).gaussian();
+        // A first draw takes as long as all else of an echo.
+        let error_m = if noise.range_sd_m > 0.0 {
+            noise.range_sd_m * self.draws(chirp, number, Purpose::Range).gaussian()
+        } else {
+            0.0
+        };
         let detection = Detection { range_m: mean.range_m + error_m, power_w };
         Measured { detection, phase_rad: phase(amplitude) }
     }

@@ -22,11 +22,12 @@ pub enum RenderError {
         way_out: &'static str,
     },
     /// An antenna stands inside the target.
-    #[error(
-        "the receiver at ({x_m}, {y_m}, {z_m}) m stands inside the target and sees nothing; move its \
-         position_m"
-    )]
+    #[error("the {antenna} at ({x_m}, {y_m}, {z_m}) m stands inside the target; move its {key}")]
     Inside {
+        /// Which antenna.
+        antenna: &'static str,
+        /// The key that says where it stands.
+        key: &'static str,
         /// x in the global frame, m.
         x_m: f64,
         /// y, m.

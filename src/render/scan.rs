@@ -159,11 +159,8 @@ pub fn beat_signals<'a>(
 /// Checks the setup before anything is computed.
 fn check(setup: &Setup, footprints: &Footprints, observer: Observer) -> Result<(), RenderError> {
     effect_scan::check(setup, footprints.rays_per_chirp, observer)?;
-    if let Observer::Receiver { position, .. } = observer
-        && is_walled_off(setup, position)
-    {
-        let [x_m, y_m, z_m] = position.xyz.to_array();
-        return Err(RenderError::Inside { x_m, y_m, z_m });
+    if let Observer::Receiver { position, .. } = observer {
+        check_walls(setup, position)?;
     }
     if setup.geometry.radar.receiver.is_some()
         && (footprints.rays_per_chirp > 1 || setup.bounce.is_some())
@@ -177,13 +174,23 @@ fn check(setup: &Setup, footprints: &Footprints, observer: Observer) -> Result<(
     Ok(())
 }
 
-/// Whether an antenna is inside a closed mesh that the radar is outside of. A room around both does not count.
-fn is_walled_off(setup: &Setup, position: Point<Global>) -> bool {
-    let origin = setup.geometry.radar.frames().origin();
-    let [here, there] =
-        [position, origin].map(|point| winding_number(setup.geometry.bvh.mesh(), point));
+/// Refuses a receiver and a radar of which one is inside a closed mesh that the other is outside of. A room around both
+/// does not count.
+fn check_walls(setup: &Setup, receiver: Point<Global>) -> Result<(), RenderError> {
+    let radar = setup.geometry.radar.frames().origin();
+    let [around_receiver, around_radar] =
+        [receiver, radar].map(|point| winding_number(setup.geometry.bvh.mesh(), point));
     // A winding number is 0 outside and 1 inside a closed mesh, and a fraction near an open one.
-    (here - there).abs() > 0.75
+    if (around_receiver - around_radar).abs() <= 0.75 {
+        return Ok(());
+    }
+    let (antenna, key, at) = if around_receiver.abs() > around_radar.abs() {
+        ("receiver", "position_m", receiver)
+    } else {
+        ("radar", "reflector_centre_m, or the target", radar)
+    };
+    let [x_m, y_m, z_m] = at.xyz.to_array();
+    Err(RenderError::Inside { antenna, key, x_m, y_m, z_m })
 }
 
 /// The error of a scan that misses its target: field of view, extent of the target, and the likeliest remedy.

@@ -12,7 +12,7 @@ use crate::error::Error;
 use crate::files::write_all;
 use crate::formats::exr::Packing;
 use crate::render::RenderError;
-use crate::report::{BeatShape, RenderFiles, RenderRequest};
+use crate::report::{BeatShape, RenderRequest};
 use crate::setup::{Database, ReadyScene};
 use crate::trace::Tracer;
 use stages::Stages;
@@ -61,9 +61,18 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         ..RenderRequest::new(&ready)
     };
     let (chirps, antennas) = (ready.scene.chirps.rays.len(), 1 + ready.scene.file.receiver.len());
-    let RenderFiles { record, files } =
+    let rendered =
         request.render(&|progress| stages.show(progress, [chirps, antennas * chirps]))?;
     stages.begin("write", None);
-    write_all(&args.output, &files)?;
-    report::print(&args.output, &record, stages, console)
+    write_all(&args.output, &rendered.files)?;
+    report::print(&args.output, &rendered.record, stages, console)?;
+    let left = rendered.left_behind(&args.output);
+    if !left.is_empty() {
+        let folder = args.output.display();
+        console.notice(&format!(
+            "{folder} also holds {} of another rendering; delete what you do not need",
+            left.join(", ")
+        ));
+    }
+    Ok(())
 }

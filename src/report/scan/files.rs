@@ -45,6 +45,14 @@ pub(super) fn encode(
     Ok(files)
 }
 
+/// Whether a file of this name is one of a rendering, for an antenna or another.
+pub(super) fn is_of_a_rendering(name: &str) -> bool {
+    let (stem, extension) = name.rsplit_once('.').unwrap_or((name, ""));
+    let stem = stem.strip_prefix("cross-").unwrap_or(stem);
+    let quantity = stem.split_once('-').map_or(stem, |(quantity, _)| quantity);
+    matches!((quantity, extension), ("power", "exr" | "png") | ("cloud", "ply") | ("beat", "npy"))
+}
+
 /// What a raster does not say by itself: its far edges, and names for the `material` channel.
 fn exr_attributes(image: &Raster, materials: &[&str]) -> Vec<(String, Attribute)> {
     let end_m =

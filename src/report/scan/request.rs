@@ -1,7 +1,9 @@
 //! A scene to be rendered, and the files of its rendering.
 
+use std::path::Path;
+
 use super::beat::BeatShape;
-use super::files::encode;
+use super::files::{encode, is_of_a_rendering};
 use super::record::ScanRecord;
 use crate::error::Error;
 use crate::formats::exr::Packing;
@@ -57,6 +59,21 @@ pub struct RenderFiles<'a> {
     /// Names and bytes: `power.exr`, `power.png` and `cloud.ply` of every antenna, `scan.json`, and the beat signals
     /// that were asked for.
     pub files: Vec<(String, Vec<u8>)>,
+}
+
+impl RenderFiles<'_> {
+    /// Names of files in a folder that an earlier rendering wrote there and this one does not: of a receiver, a
+    /// polarisation or a beat signal that there is no longer.
+    pub fn left_behind(&self, folder: &Path) -> Vec<String> {
+        let entries = folder.read_dir().into_iter().flatten().flatten();
+        let mut names: Vec<String> = entries
+            .filter_map(|entry| entry.file_name().into_string().ok())
+            .filter(|name| is_of_a_rendering(name))
+            .filter(|name| self.files.iter().all(|(written, _)| written != name))
+            .collect();
+        names.sort_unstable();
+        names
+    }
 }
 
 impl<'a> RenderRequest<'a> {
