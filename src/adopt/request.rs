@@ -10,15 +10,13 @@ use crate::effects::{Effect, library};
 use crate::error::Error;
 use crate::files::folder_of;
 use crate::measure::{Cloud, CloudError};
-use crate::radar::{Pattern, SpeckleForm};
+use crate::radar::Pattern;
 use crate::report::{Choice, Measurands, Reason};
 use crate::scene::{Scene, read_text};
 use crate::setup::ReadyScene;
 use crate::store::Store;
 
 /// Warning for a scene according to which every chirp would measure its power exactly.
-const SHARED_SPECKLE: &str = "neighbouring chirps share their speckle, and the likelihood takes each for a draw of its own: intervals are too \
-                              narrow, and weak effects can be named that are not there";
 const NO_SPECKLE: &str = "the scene declares no speckle, so that any scatter of the powers is an effect to be found; a \
                           measured cloud has some: state `looks` under [radar.speckle]";
 
@@ -135,10 +133,6 @@ impl CheckedRequest<'_> {
         let mut notices = self.ready.notices();
         if self.ready.scene.radar().speckle.is_none() {
             notices.push(NO_SPECKLE.to_owned());
-        }
-        let form = self.ready.speckle_form();
-        if form.is_some_and(|form| form != SpeckleForm::Independent) {
-            notices.push(SHARED_SPECKLE.to_owned());
         }
         notices
     }

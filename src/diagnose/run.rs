@@ -113,6 +113,7 @@ fn report(
         unexplained,
         error: answer::before_after(scorer, errors, with_unknown),
         set_aside: subject.strays.len(),
+        independent_chirps: scorer.problem.shared.count(subject.shots.len()),
         controls,
         base: answer::base(subject, &model.state, &sd),
         laws: space.model(subject.receiver, &fit.at).laws,

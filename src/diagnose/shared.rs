@@ -175,3 +175,92 @@ fn correlations(z: &[Option<f64>], neighbours: &Neighbours, lag_m: f64) -> Vec<f
         .map(|s| s.unwrap_or(0.0))
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::radar::random::{Key, Purpose};
+    use crate::radar::{Chirps, Radar};
+
+    /// Chirps on a square grid with this step, m.
+    const STEP_M: f64 = 0.006;
+    const SIDE: usize = 100;
+    const SPOT_M: f64 = 0.016;
+
+    fn shots() -> Vec<Shot> {
+        let radar = Radar::default();
+        let chirps = Chirps::draw(&radar, |_| Err("no file".to_owned())).unwrap();
+        let at = |index: usize| STEP_M * index as f64;
+        (0..SIDE * SIDE)
+            .map(|index| {
+                let [xt_m, yt_m] = [at(index % SIDE), at(index / SIDE)];
+                Shot { xt_m, yt_m, ..Shot::missed(&chirps, index, 0.0) }
+            })
+            .collect()
+    }
+
+    /// White noise, convolved so that places d apart share exp(−2d²/w²); independent for w = 0.
+    fn field(width_m: f64, seed: u64) -> Vec<f64> {
+        let noise: Vec<f64> = (0..SIDE * SIDE)
+            .map(|index| {
+                let key = Key { seed, chirp: index as u64, sub_ray: 0, purpose: Purpose::Fit };
+                key.draws().gaussian()
+            })
+            .collect();
+        let reach = (2.0 * width_m / STEP_M).ceil() as i64;
+        let weight = |i: i64| {
+            let off = i as f64 * STEP_M / width_m.max(1e-9);
+            (-4.0 * off * off).exp()
+        };
+        let along = |values: &[f64], stride: usize| -> Vec<f64> {
+            let place = |index: usize| (index / stride % SIDE) as i64;
+            let sum = |index: usize| {
+                let near =
+                    (-reach..=reach).filter(|i| (0..SIDE as i64).contains(&(place(index) + i)));
+                let pairs = near.map(|i| (weight(i), (index as i64 + i * stride as i64) as usize));
+                let (sum, squares) = pairs.fold((0.0, 0.0), |(sum, squares), (weight, other)| {
+                    (sum + weight * values[other], squares + weight * weight)
+                });
+                sum / f64::sqrt(squares)
+            };
+            (0..values.len()).map(sum).collect()
+        };
+        along(&along(&noise, 1), SIDE)
+    }
+
+    fn found(z: &[f64]) -> SharedSpeckle {
+        let seen = Observation { power_w: Some(1e-9), range_m: None };
+        SharedSpeckle::of(z, &vec![seen; z.len()], &shots(), SPOT_M)
+    }
+
+    #[test]
+    fn shots_count_as_much_as_they_have_to_themselves() {
+        for width_m in [0.0136, 0.0192] {
+            let found = found(&field(width_m, 1));
+            // Σρ over the square lattice.
+            let lattice = |i: i64| (-2.0 * (i as f64 * STEP_M / width_m).powi(2)).exp();
+            let side: f64 = (-20..=20).map(lattice).sum();
+            let weight = found.weight(SIDE * SIDE / 2 + SIDE / 2);
+            assert!((weight * side * side - 1.0).abs() < 0.2, "{width_m}: {weight} {side}");
+            // At the edge there are fewer neighbours.
+            assert!(found.weight(0) > 1.5 * weight);
+            assert!(found.reach_m > width_m && found.reach_m < 2.2 * width_m, "{}", found.reach_m);
+        }
+    }
+
+    #[test]
+    fn independent_shots_and_what_is_missing_share_no_speckle() {
+        assert_eq!(found(&field(0.0, 2)), ALONE);
+        // A slope of one and a half standard deviations over the target.
+        let slope = |index: usize| 3.0 * ((index % SIDE) as f64 / SIDE as f64 - 0.5);
+        let leaning: Vec<f64> =
+            field(0.0, 3).iter().enumerate().map(|(index, z)| z + slope(index)).collect();
+        assert_eq!(found(&leaning), ALONE);
+        // A patch of 5 cm that is four standard deviations brighter.
+        let bright = |index: usize| index % SIDE < 8 && index / SIDE < 8;
+        let patched: Vec<f64> = (field(0.0, 4).iter().enumerate())
+            .map(|(index, z)| if bright(index) { z + 4.0 } else { *z })
+            .collect();
+        assert_eq!(found(&patched), ALONE);
+    }
+}

@@ -11,11 +11,15 @@ use super::hit::Hit;
 use super::pinhole::{Fan, NoFan};
 use crate::frames::{Global, Ray};
 
+/// Facets per ray from which on a hierarchy that is built is faster than a fan.
+const FACETS_PER_RAY: usize = 3;
+
 /// A method to find the closest hits of many rays. All give the same hits ([`Brute`](Self::Brute) up to rounding);
 /// they differ in speed and in the rays that they accept.
 #[derive(Clone, Copy, Default)]
 pub enum Tracer<'a> {
-    /// [`Fan`] if all rays share an origin, otherwise [`Bvh`].
+    /// [`Fan`] if all rays share an origin, otherwise [`Bvh`]; also [`Bvh`] if it is built and facets are many more than
+    /// rays, since a fan reads every facet.
     #[default]
     Automatic,
     /// [`Fan`]: accepts rays of one origin only, and builds no hierarchy.
@@ -58,6 +62,9 @@ impl Tracer<'_> {
 
 /// Finds the closest hit of every ray with [`Tracer::Automatic`], which accepts any rays and cannot fail.
 pub fn closest(bvh: &Bvh, rays: &[Ray<Global>]) -> Vec<Option<Hit>> {
+    if bvh.is_built() && bvh.mesh().facets.len() > FACETS_PER_RAY * rays.len() {
+        return bvh.closest_of_each(rays);
+    }
     match Fan::new(rays) {
         Ok(fan) => fan.closest(bvh.mesh()),
         Err(_) => bvh.closest_of_each(rays),

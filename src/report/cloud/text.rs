@@ -27,6 +27,13 @@ pub(super) fn text(report: &Report, peaks: &[Peak], files: &[String], folder: &P
             report.set_aside
         );
     }
+    if report.independent_chirps < report.rows.len() as f64 {
+        text += &format!(
+            "neighbours share speckle: the {} chirps on the target count as {:.0}\n",
+            report.rows.len(),
+            report.independent_chirps
+        );
+    }
     let mut not_found: Vec<&str> = report.not_found().map(|tried| tried.name).collect();
     not_found.sort_unstable();
     if !not_found.is_empty() {
