@@ -36,6 +36,7 @@ mod run;
 mod search;
 mod sensitivity;
 mod settings;
+mod shapes;
 mod stored;
 mod summary;
 mod table;

@@ -8,6 +8,7 @@ use super::least_squares::{Deviations, Squares};
 use super::likelihood::{Curvature, Likelihood};
 use super::minimise::{Local, Minimise, Minimum, Stop};
 use super::settings::{Fit, Method};
+use super::shapes;
 use super::uncertainty::{Uncertainty, observed_information};
 use crate::material::Observation;
 use crate::radar::random::{Key, Purpose};
@@ -39,8 +40,8 @@ impl Fit {
         match self.method {
             Method::Censored => self.search_likelihood(coordinates, rows),
             Method::Tls { .. } | Method::Mse { .. } => {
-                let (best, agreeing) =
-                    self.best(coordinates, |start| self.nearest_optimum(coordinates, rows, start));
+                let search = |start: &DVector<f64>| self.nearest_optimum(coordinates, rows, start);
+                let (best, agreeing) = self.best(coordinates, rows, search);
                 squares_found(coordinates, rows, best, agreeing)
             }
         }
@@ -75,7 +76,7 @@ impl Fit {
         let approach = Minimise { iterations: APPROACH, tolerance: NEAR, patience: usize::MAX };
         let search = likelihood_search();
         // With free looks the search would explain a far start by strong speckle instead of improving it.
-        let (best, agreeing) = self.best(coordinates, |start| {
+        let (best, agreeing) = self.best(coordinates, rows, |start| {
             let [lower, upper] = coordinates.holding_looks(start);
             let near = approach
                 .run(start, [&lower, &upper], |at| likelihood.local(Curvature::FromAfar, at));
@@ -97,12 +98,13 @@ impl Fit {
     fn best(
         &self,
         coordinates: &Coordinates,
+        rows: &[Observation],
         search: impl Fn(&DVector<f64>) -> Minimum,
     ) -> (Minimum, usize) {
         let mut best = search(&coordinates.start());
         let mut costs = vec![best.local.value];
-        for number in 1..self.starts {
-            let found = search(&drawn_start(coordinates, self.seed, number));
+        for start in self.other_starts(coordinates, rows) {
+            let found = search(&start);
             costs.push(found.local.value);
             let improves = found.local.value < best.local.value || !best.local.value.is_finite();
             if improves && found.local.value.is_finite() {
@@ -111,6 +113,33 @@ impl Fit {
         }
         let agreeing = costs.iter().filter(|cost| **cost - best.local.value <= SAME).count();
         (best, agreeing)
+    }
+
+    /// Starts beside the given one: the best of all shapes, and drawn ones where those are fewer than wanted.
+    fn other_starts(&self, coordinates: &Coordinates, rows: &[Observation]) -> Vec<DVector<f64>> {
+        let wanted = self.starts - 1;
+        if wanted == 0 {
+            return Vec::new();
+        }
+        let rows = shapes::sample(rows);
+        let mut starts = match self.method {
+            Method::Censored => {
+                let likelihood = Likelihood::new(coordinates, &rows, self.noise_w.unwrap_or(0.0));
+                let cost = |at: &DVector<f64>| likelihood.local(Curvature::FromAfar, at);
+                shapes::starts(coordinates, wanted, cost)
+            }
+            Method::Tls { theta_sd_rad, level_sd_db } => {
+                let deviations = Deviations { theta_sd_rad, level_sd_db };
+                let squares = Squares::new(coordinates, &rows, deviations);
+                shapes::starts(coordinates, wanted, |at| squares.local(at))
+            }
+            // In two pieces there is no cost of all numbers.
+            Method::Mse { .. } => Vec::new(),
+        };
+        for number in starts.len() + 1..=wanted {
+            starts.push(drawn_start(coordinates, self.seed, number));
+        }
+        starts
     }
 }
 

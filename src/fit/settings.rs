@@ -46,7 +46,8 @@ pub struct Fit {
     /// Mean thermal power in each chirp, W, 0 or more; none for a receiver without noise. Least squares
     /// does not use it.
     pub noise_w: Option<f64>,
-    /// Points that the search starts from, 1 to 1000: the given model first, then drawn around it.
+    /// Points that the search starts from, 1 to 1000: the given model, then the best among all shapes of its lobes, then
+    /// points drawn around it.
     pub starts: usize,
     /// Seed of the drawn starts and of the randomised residuals.
     pub seed: u64,
