@@ -101,6 +101,28 @@ fn column(csv: &str, name: &str) -> Vec<Option<f64>> {
 /// The table rounds powers to 0.0001 dB.
 const ROUNDING_DB: f64 = 2e-4;
 
+/// The law's form is not the one that the scene states, and the residuals have to show it.
+#[test]
+fn speckle_that_neighbours_share_is_no_effect() {
+    let folder = tempfile::tempdir().unwrap();
+    let shared =
+        SCENE.replace("\"independent\"", "\"law\"").replace("chirps = 3000", "chirps = 9000");
+    let stated = shared.replace("\"law\"", "\"independent\"");
+    fs::write(folder.path().join("measured.toml"), shared).unwrap();
+    fs::write(folder.path().join("scene.toml"), stated).unwrap();
+    matdb(folder.path()).args(["render", "-q", "measured.toml", "-o", "out"]).assert().success();
+    let arguments = ["diagnose", "-q", "out/cloud.ply", "--scene", "scene.toml", "-o", "answer"];
+    let effects = ["--effects", "foreign-patch,fov-gain,drift,subsurface"];
+    matdb(folder.path()).args(arguments).args(effects).assert().success();
+    let report = fs::read(folder.path().join("answer/report.json")).unwrap();
+    let report: Value = serde_json::from_slice(&report).unwrap();
+    assert_eq!(report["verdict"], "no-missing-effect", "{}", report["effects"]);
+    let rows =
+        fs::read_to_string(folder.path().join("answer/residuals.csv")).unwrap().lines().count();
+    let share = report["independent_chirps"].as_f64().unwrap() / rows as f64;
+    assert!((0.05..0.5).contains(&share), "{share}");
+}
+
 #[test]
 fn a_report_is_complete_and_its_table_gives_its_errors() {
     let folder = rendered("1");

@@ -297,8 +297,8 @@ fn files_of_an_antenna_that_is_gone_are_named() {
     fs::write(folder.path().join("out/notes.txt"), "mine").unwrap();
     let again = matdb(folder.path()).args(["render", "scene.toml", "-o", "out"]).output().unwrap();
     let notes = String::from_utf8(again.stderr).unwrap();
-    let left = "out also holds cloud-beside.ply, power-beside.exr, power-beside.png of another rendering; \
-                delete what you do not need";
+    let left = "out also holds cloud-beside.ply, power-beside.exr, power-beside.png, which this rendering \
+                did not write";
     assert!(again.status.success() && notes.contains(left), "{notes}");
 }
 

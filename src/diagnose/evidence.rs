@@ -101,10 +101,10 @@ impl Largest {
         })
     }
 
-    /// Gain below which another effect may only correct the form of the largest, on a scan of this many shots.
-    pub fn least_gain(self, is_spread: bool, shots: usize) -> f64 {
+    /// Gain below which another effect may only correct the form of the largest, on a scan of this many independent shots.
+    pub fn least_gain(self, is_spread: bool, shots: f64) -> f64 {
         let share = if is_spread { SHARE_OF_GAIN_OF_SPREAD } else { SHARE_OF_GAIN };
-        share * self.gain.min(MOST_OF_A_SHOT * shots as f64)
+        share * self.gain.min(MOST_OF_A_SHOT * shots)
     }
 }
 
@@ -116,11 +116,11 @@ mod tests {
     fn what_stands_beside_a_large_effect_must_be_large_itself() {
         let is_near = |gain: f64, expected: f64| (gain - expected).abs() < 1e-9;
         let large = Largest { size_db: 2.0, gain: 7_580.0 };
-        assert!(is_near(Largest::default().least_gain(false, 18_529), 0.0));
-        assert!(is_near(large.least_gain(false, 18_529), 758.0));
-        assert!(is_near(large.least_gain(true, 18_529), 379.0));
+        assert!(is_near(Largest::default().least_gain(false, 18_529.0), 0.0));
+        assert!(is_near(large.least_gain(false, 18_529.0), 758.0));
+        assert!(is_near(large.least_gain(true, 18_529.0), 379.0));
         // A pose far off gains without end at edges, which must not hide any other effect.
         let far = Largest { gain: 170_150.0, ..large };
-        assert!(is_near(far.least_gain(false, 8_708), 1_741.6));
+        assert!(is_near(far.least_gain(false, 8_708.0), 1_741.6));
     }
 }

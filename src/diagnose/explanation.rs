@@ -61,7 +61,7 @@ impl<'a> Explanation<'a> {
             share_of_size: SHARE_OF_LARGEST,
             largest: self.largest(),
         };
-        let is_needed = claim.is_supported(scorer.settings, scorer.problem.shots.len());
+        let is_needed = claim.is_supported(scorer.settings, scorer.problem.independent_shots());
         Removal { index, without, loss, is_needed }
     }
 

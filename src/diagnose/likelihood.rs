@@ -48,6 +48,8 @@ pub(super) struct Term {
     pub pull: f64,
     /// −d² ln p/d(ln mean)², never negative.
     pub bend: f64,
+    /// The part of the range in `ln_p`.
+    pub ln_range: f64,
     /// Predicted range, m; 0 where nothing arrives.
     pub range_m: f64,
     /// d ln p/d range, 1/m.
@@ -113,6 +115,7 @@ impl<'a> Likelihood<'a> {
             slope: weight * slope / p,
             pull: weight * pull,
             bend: weight * bend / p,
+            ln_range,
             range_m,
             range_slope,
             range_bend,

@@ -33,6 +33,11 @@ pub(super) struct Problem<'a> {
 }
 
 impl Problem<'_> {
+    /// Effective number of independent shots.
+    pub fn independent_shots(&self) -> f64 {
+        self.shared.count(self.shots.len())
+    }
+
     /// The prediction of a point.
     pub fn predict(&self, space: &Space, at: &DVector<f64>) -> Prediction {
         space.model(self.receiver, at).predict_with(self.stage, self.shots, self.traced)
@@ -150,14 +155,17 @@ impl Problem<'_> {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Slope {
     pub ln_p: f64,
+    /// The part of the range in it.
+    pub ln_range: f64,
     pub ln_mean: f64,
     pub range_m: f64,
 }
 
 impl Slope {
     fn times(self, by: f64) -> Slope {
-        let Slope { ln_p, ln_mean, range_m } = self;
-        Slope { ln_p: by * ln_p, ln_mean: by * ln_mean, range_m: by * range_m }
+        let Slope { ln_p, ln_range, ln_mean, range_m } = self;
+        let (ln_p, ln_range) = (by * ln_p, by * ln_range);
+        Slope { ln_p, ln_range, ln_mean: by * ln_mean, range_m: by * range_m }
     }
 }
 
@@ -167,8 +175,9 @@ fn quotients(more: &[Term], less: &[Term], width: f64) -> Vec<Slope> {
     let pairs = more.iter().zip(less);
     pairs
         .map(|(a, b)| {
-            let (ln_p, ln_mean) = (a.ln_p - b.ln_p, a.ln_mean - b.ln_mean);
-            Slope { ln_p, ln_mean, range_m: a.range_m - b.range_m }.times(per_width)
+            let (ln_p, ln_range) = (a.ln_p - b.ln_p, a.ln_range - b.ln_range);
+            let (ln_mean, range_m) = (a.ln_mean - b.ln_mean, a.range_m - b.range_m);
+            Slope { ln_p, ln_range, ln_mean, range_m }.times(per_width)
         })
         .collect()
 }

@@ -178,7 +178,9 @@ impl Bench<'_> {
         let scorer = Scorer { problem, ..self.scorer };
         let without = scorer.held_out(bare, &before.at);
         let [held_out, se] = scorer.difference(&scorer.held_out(&with, &after.at), &without);
-        let [held_out, se] = [self.weight * held_out, self.weight.sqrt() * se];
+        // The simulated shots are independent, and those of the scan scatter by the root of what they count more.
+        let shared = problem.independent_shots() / problem.shots.len().max(1) as f64;
+        let [held_out, se] = [self.weight * held_out, (self.weight / shared).sqrt() * se];
         Recovery { is_found: held_out.min(gain) > scorer.settings.standard_errors * se, size_db }
     }
 

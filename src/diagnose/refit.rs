@@ -157,8 +157,8 @@ impl Problem<'_> {
             if term.weight == 1.0 {
                 return a.ln_p * b.ln_p;
             }
-            let [in_range_a, in_range_b] = [a, b].map(|slope| term.range_slope * slope.range_m);
-            (a.ln_p - in_range_a) * (b.ln_p - in_range_b) / term.weight + in_range_a * in_range_b
+            let [power_a, power_b] = [a, b].map(|slope| slope.ln_p - slope.ln_range);
+            power_a * power_b / term.weight + a.ln_range * b.ln_range
         };
         let mut products: DMatrix<f64> = DMatrix::zeros(free.len(), free.len());
         for (row, &i) in free.iter().enumerate() {

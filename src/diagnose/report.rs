@@ -287,8 +287,7 @@ pub struct Report {
     /// Detections away from where their chirps meet the target. They are set aside, and their chirps count as
     /// silent.
     pub set_aside: usize,
-    /// As how many independent ones the chirps that meet the target count: fewer where their speckle is shared, as the
-    /// residuals show it.
+    /// Effective number of independent chirps on the target: fewer than there are where neighbours share speckle.
     pub independent_chirps: f64,
     /// Controls of the answer.
     pub controls: Controls,

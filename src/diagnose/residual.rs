@@ -180,14 +180,14 @@ pub(super) fn outliers(
 
 /// Scatter of another shape than declared, such as a speckle that is not Gamma: z is skewed
 /// although mean and spread are right. Its third moment is 0 under the model, with the standard
-/// deviation √(6/n) for n independent shots; the corresponding displacement is (z² − 1)/6 of it (Cornish and Fisher).
+/// deviation √(6/n), n the number of independent shots with its scatter; the corresponding displacement is (z² − 1)/6 of it (Cornish and Fisher).
 pub(super) fn skewness(z: &[f64], shared: &SharedSpeckle, sd_db: f64) -> Option<ResidualStructure> {
     // Single shots far out count as outliers.
     let inner: Vec<f64> = z.iter().map(|z| z.clamp(-SKEWED_REACH, SKEWED_REACH)).collect();
     let count = inner.len().max(1) as f64;
     let mean = inner.iter().sum::<f64>() / count;
     let third = inner.iter().map(|z| (z - mean).powi(3)).sum::<f64>() / count;
-    let chance = erfc(third.abs() / (6.0 / shared.count(z.len())).sqrt() / SQRT_2);
+    let chance = erfc(third.abs() / (6.0 / shared.count_of_cubes(z.len())).sqrt() / SQRT_2);
     (third.abs() > SKEWED && chance < SKEWED_BY_CHANCE).then(|| ResidualStructure {
         covariate: "form of the scatter".to_owned(),
         strength_db: sd_db * SQRT_2 * third.abs() / 6.0,

@@ -113,7 +113,7 @@ fn report(
         unexplained,
         error: answer::before_after(scorer, errors, with_unknown),
         set_aside: subject.strays.len(),
-        independent_chirps: scorer.problem.shared.count(subject.shots.len()),
+        independent_chirps: scorer.problem.independent_shots(),
         controls,
         base: answer::base(subject, &model.state, &sd),
         laws: space.model(subject.receiver, &fit.at).laws,

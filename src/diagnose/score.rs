@@ -23,7 +23,7 @@ pub(super) const DB: f64 = 10.0 / std::f64::consts::LN_10;
 /// The score of a prediction at one shot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Score {
-    /// ln p, as much as the shot counts.
+    /// ln p times the weight of the shot.
     pub ln_p: f64,
     /// ln p of the shot by itself.
     pub whole_ln_p: f64,

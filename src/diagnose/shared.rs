@@ -1,7 +1,7 @@
 //! Speckle that neighbouring chirps share.
 //!
-//! Beams that overlap see the same scatterers, so that chirps are fewer observations than they are chirps. How much they
-//! share is read from the residuals of the fitted model, whatever the radar declares: their correlation ρ over distance
+//! Beams that overlap see the same scatterers, so that the effective number of observations is below that of the chirps. How much
+//! they share is read from the residuals of the fitted model, whatever the radar declares: their correlation ρ over distance
 //! in the target plane, less that at two to three spots, which a missing effect leaves and speckle does not. A
 //! chirp then counts in the likelihood as 1/Σρ over itself and its neighbours. The score of a mean that changes slowly
 //! over a spot has the variance Σᵢ wᵢ·Σⱼ wⱼρᵢⱼ ≈ Σ wᵢ, as much as its curvature says, so that gains and standard
@@ -31,16 +31,19 @@ const SHARED: f64 = 0.1;
 const MOST: f64 = 2.5;
 
 /// How much each shot counts.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct SharedSpeckle {
     /// Share of an independent observation in every shot, above 0 and at most 1; empty where each is one.
     weights: Vec<f64>,
+    /// Σρ/Σρ³ over all pairs: by so much the third powers of residuals are more independent than the residuals.
+    cubes: f64,
     /// Distance up to which shots share speckle, m.
     pub reach_m: f64,
 }
 
 /// Shots that share nothing.
-pub(super) static ALONE: SharedSpeckle = SharedSpeckle { weights: Vec::new(), reach_m: 0.0 };
+pub(super) static ALONE: SharedSpeckle =
+    SharedSpeckle { weights: Vec::new(), cubes: 1.0, reach_m: 0.0 };
 
 /// Shots in squares as wide as the farthest neighbours.
 struct Neighbours<'a> {
@@ -88,14 +91,20 @@ impl SharedSpeckle {
         let shares = correlations(&residuals(z, observations), &neighbours, lag_m);
         let reach = shares.len();
         if reach == 0 {
-            return SharedSpeckle::default();
+            return ALONE.clone();
         }
-        let weight = |index: usize| {
-            let lags = neighbours.of(index).map(|(_, apart_m)| (apart_m / lag_m) as usize);
-            1.0 / (1.0 + lags.filter_map(|lag| shares.get(lag)).sum::<f64>())
-        };
-        let weights = (0..shots.len()).into_par_iter().map(weight).collect();
-        SharedSpeckle { weights, reach_m: reach as f64 * lag_m }
+        // Σρ and Σρ³ of each shot with all, itself included.
+        let sums: Vec<[f64; 2]> = (0..shots.len())
+            .into_par_iter()
+            .map(|index| {
+                let lags = neighbours.of(index).map(|(_, apart_m)| (apart_m / lag_m) as usize);
+                let found = lags.filter_map(|lag| shares.get(lag));
+                found.fold([1.0; 2], |[sum, cubes], share| [sum + share, cubes + share.powi(3)])
+            })
+            .collect();
+        let all = |power: usize| sums.iter().map(|sums| sums[power]).sum::<f64>();
+        let (cubes, weights) = (all(0) / all(1), sums.iter().map(|sums| 1.0 / sums[0]).collect());
+        SharedSpeckle { weights, cubes, reach_m: reach as f64 * lag_m }
     }
 
     /// Whether shots share speckle.
@@ -113,7 +122,12 @@ impl SharedSpeckle {
         (0..shots).map(|shot| self.weight(shot)).sum()
     }
 
-    /// The weights of every so manieth shot.
+    /// As many independent shots scatter as much in the third powers of their residuals.
+    pub fn count_of_cubes(&self, shots: usize) -> f64 {
+        self.cubes * self.count(shots)
+    }
+
+    /// The weights of every n-th shot.
     pub fn step_by(&self, every: usize) -> SharedSpeckle {
         let weights = self.weights.iter().step_by(every).copied().collect();
         SharedSpeckle { weights, ..*self }
@@ -165,7 +179,10 @@ fn correlations(z: &[Option<f64>], neighbours: &Neighbours, lag_m: f64) -> Vec<f
     let detected = z.iter().flatten().count().max(1) as f64;
     let variance = z.iter().flatten().map(|z| z * z).sum::<f64>() / detected - beyond;
     let share = |mean: f64| ((mean - beyond) / variance.max(f64::MIN_POSITIVE)).min(1.0);
-    if mean(0, (0.5 * PER_SPOT) as usize).is_none_or(|near| share(near) < SHARED) {
+    // Within half a spot, or where a coarse scan has its nearest neighbours.
+    let nearest = (1..=PER_SPOT as usize).find_map(|end| mean(0, end));
+    let near = mean(0, (0.5 * PER_SPOT) as usize).or(nearest);
+    if near.is_none_or(|near| share(near) < SHARED) {
         return Vec::new();
     }
     // A distance at which there are no neighbours ends nothing.

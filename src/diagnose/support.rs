@@ -46,8 +46,8 @@ impl Claim {
         self.held_out[0].min(self.gain)
     }
 
-    /// Whether fit, held-out patches and size support the effect, on a scan of this many shots.
-    pub fn is_supported(&self, settings: &Diagnosis, shots: usize) -> bool {
+    /// Whether fit, held-out patches and size support the effect, on a scan of this many independent shots.
+    pub fn is_supported(&self, settings: &Diagnosis, shots: f64) -> bool {
         let Diagnosis { least_size_db, standard_errors, .. } = *settings;
         let Claim { gain, least, held_out: [held_out, se], size, largest, .. } = *self;
         // An effect of one small place, which no scatter is, has no standard error over places. It
@@ -83,7 +83,7 @@ impl<'j, 'p, 'a> Judge<'j, 'p, 'a> {
     /// Held-out scores of a trial and the gain that counts; `None` where it is not supported.
     pub fn support(&self, trial: &mut Trial) -> Option<(Vec<Score>, f64)> {
         let Candidate { gain, numbers, .. } = trial.candidate;
-        let (settings, shots) = (self.scorer.settings, self.scorer.problem.shots.len());
+        let (settings, shots) = (self.scorer.settings, self.scorer.problem.independent_shots());
         let is_spread = trial.size.is_spread();
         let mut claim = Claim {
             gain,

@@ -94,7 +94,8 @@ impl<'p> Search<'p> {
         self.scout_promising(state, &screen, &mut trials, round);
         sort(&mut trials);
         // Effects on the scatter need the smaller gain.
-        let hopeless = SHARE_OF_HOPE * largest.least_gain(true, self.scorer.problem.shots.len());
+        let shots = self.scorer.problem.independent_shots();
+        let hopeless = SHARE_OF_HOPE * largest.least_gain(true, shots);
         self.refit_shortlist(state, &mut trials, round, hopeless);
         sort(&mut trials);
         if let Some(first) = trials.first_mut() {

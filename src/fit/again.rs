@@ -78,7 +78,11 @@ pub fn problems(material: &Material, fit: &material::Fit) -> Option<Vec<String>>
             return Some(Vec::new());
         }
     }
-    Some(found)
+    // A search that had fewer starts may have ended in another optimum, which is still found from where it is.
+    let mut alone = fit.clone();
+    alone.report.iter_mut().for_each(|report| report.starts = 1);
+    let near = differences(&alone, &curve).unwrap_or_else(|error| vec![error.to_string()]);
+    Some(if near.is_empty() { near } else { found })
 }
 
 /// Models from which the search may have started. A report does not say it, and the result depends on it where the data

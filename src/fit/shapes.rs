@@ -18,14 +18,14 @@ const ROWS: usize = 250;
 /// Places that are tried for each shape, and in all.
 const PER_SHAPE: usize = 8;
 const MOST: usize = 64;
-/// Search of the levels at one place, which promises ten times less than tells places apart.
+/// Search of the levels at one place; it only has to rank the places.
 const LEVELS: Minimise = Minimise { iterations: 6, tolerance: 1.0, patience: 3 };
 /// Share of the range of a shape within which two places lead to the same optimum.
 const NEAR: f64 = 0.2;
 /// Incidences at which a number is tested for being a level, rad.
 const ANGLES_RAD: [f64; 4] = [0.0, 0.05, 0.3, 1.0];
 
-/// Every so manieth row by incidence.
+/// Every n-th row by incidence.
 pub(super) fn sample(rows: &[Observation]) -> Vec<Observation> {
     let mut sorted = rows.to_vec();
     sorted.sort_by(|a, b| a.theta_i_rad.total_cmp(&b.theta_i_rad));

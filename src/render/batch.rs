@@ -26,7 +26,7 @@ use super::setup::Setup;
 use super::spot::{self, Spot};
 use super::surface::Surface;
 use crate::brdf::Term;
-use crate::frames::{Global, Pose, Ray};
+use crate::frames::{Direction, Global, Pose, Ray};
 use crate::radar::{Detection, Footprint, Link};
 use crate::trace::{
     Cone, EchoTracer, GpuError, Hit, LocalFrame, Piece, RAYS_PER_SHARE, ScanGeometry, Share,
@@ -192,13 +192,15 @@ impl<'a> Work<'a> {
             rays,
             samples: spot::samples(rays),
             lit_shares: spot::lit_shares(rays),
-            pieces: match rays {
-                1 => Vec::new(),
-                _ => smooth_pieces(bvh.mesh(), region_of_facet),
-            },
+            pieces: Vec::new(),
             regions: region_of_facet.iter().max().map_or(0, |&last| usize::from(last) + 1),
             echo_tracer: None,
         };
+        let beam_rad = work.link.beam.towards(0.0, 0.0).divergence_rad();
+        let mut surfaces = takes.iter().flat_map(|take| take.surfaces);
+        if rays > 1 && surfaces.any(|surface| surface.has_wave(beam_rad)) {
+            work.pieces = smooth_pieces(bvh.mesh(), region_of_facet);
+        }
         if let Tracer::Gpu(held) = batch.geometry.tracer {
             if !std::ptr::eq(held.bvh(), batch.geometry.bvh) {
                 return Err(gpu_error(GpuError::OtherMesh));
@@ -247,9 +249,10 @@ impl<'a> Work<'a> {
         let rays = self.rays as f64;
         let mut means: Vec<_> = sums.iter().map(|sums| sums.arrival(rays)).collect();
         let cut: Vec<usize> = (0..sums.len()).filter(|&place| sums[place].is_cut()).collect();
+        let apart = open.iter().filter(|(place, _)| cut.binary_search(place).is_err()).count();
         let whole = self.whole_echoes(some.start, &spots, &cut)?;
         cut.iter().zip(whole).for_each(|(&place, echo)| means[place] = echo);
-        Ok((means, open.len() + self.rays * cut.len()))
+        Ok((means, apart + self.rays * cut.len()))
     }
 
     /// What the device computed of a chirp.
@@ -279,7 +282,8 @@ impl<'a> Work<'a> {
                 .iter()
                 .map(move |&sample| Some((place, *mesh_from_world * spot.ray(sample)?)))
         };
-        let rays: Vec<Option<(usize, Ray<Global>)>> = some.iter().flat_map(of_chirp).collect();
+        let rays: Vec<Option<(usize, Ray<Global>)>> =
+            some.par_iter().flat_map_iter(of_chirp).collect();
         let sent: Vec<(usize, Ray<Global>)> = rays.iter().flatten().copied().collect();
         let mut found = self.paths(first, spots, &sent)?.into_iter();
         let paths: Vec<Option<Path>> =
@@ -406,6 +410,9 @@ fn device_terms(surface: &Surface, widest_rad: f64) -> Option<Vec<Term>> {
     /// Change of a diffuse term, as a share of it, that is within the precision of a device.
     const SMALL: f64 = 1e-3;
     let mut terms = surface.scattering.backscatter()?;
+    if surface.seen_lobe_rad.is_none() && !have_waves_of(surface, &terms, widest_rad) {
+        return None;
+    }
     for term in terms.iter_mut().filter(|_| surface.seen_lobe_rad.is_some()) {
         match &mut term.facets {
             Some(facets) if facets.m >= widest_rad => facets.includes_beam = true,
@@ -414,6 +421,23 @@ fn device_terms(surface: &Surface, widest_rad: f64) -> Option<Vec<Term>> {
         }
     }
     Some(terms)
+}
+
+/// Whether the coherent share of a surface is that of its terms. A mirror with a lobe of its own is coherent as a whole.
+fn have_waves_of(surface: &Surface, terms: &[Term], beam_rad: f64) -> bool {
+    const NEAR: f64 = 1e-3;
+    [0.0, 0.05, 0.3].into_iter().all(|theta_rad: f64| {
+        let (mut whole, mut coherent) = (0.0, 0.0);
+        for term in terms {
+            let per_sr = term.per_sr(beam_rad, theta_rad.cos());
+            let share = |m: f64| beam_rad * beam_rad / (m * m + beam_rad * beam_rad);
+            whole += per_sr;
+            coherent += per_sr * term.facets.map_or(0.0, |facets| share(facets.m));
+        }
+        let from = Direction::from_angles(theta_rad, 0.0);
+        let expected = surface.seen_by(beam_rad, from, from).coherent_share;
+        (coherent - expected * whole).abs() <= NEAR * whole
+    })
 }
 
 fn gpu_error(error: GpuError) -> RenderError {

@@ -117,6 +117,9 @@ fn delay_m(ways: &[Passage]) -> f64 {
     ways.iter().map(|way| way.delay_m()).sum()
 }
 
+/// In place of a smooth piece, for a hit that the antenna does not see.
+const UNSEEN: u32 = u32::MAX;
+
 impl<'a> Paths<'a> {
     pub fn new(
         setup: &'a Setup<'a>,
@@ -330,7 +333,8 @@ impl<'a> Emission<'a> {
             sheets: lit.inward.sheets,
             passed_share: polarised.passed,
             delay_m: apparent_m,
-            pieces: [self.piece(&lit.hit); 2],
+            // What the antenna does not see is missing from the wave of its piece.
+            pieces: [if outward.is_some() { self.piece(&lit.hit) } else { UNSEEN }; 2],
             surfaces: 1,
             azimuth_rad: y.atan2(x),
             specular_share: scattered.specular_share,

@@ -4,7 +4,6 @@ use super::bounce::Bounce;
 use super::sheet::Sheet;
 use super::surface::Surface;
 use crate::effects::Model;
-use crate::frames::Direction;
 use crate::radar::{Beam, Channel, SpeckleForm};
 use crate::trace::ScanGeometry;
 
@@ -65,10 +64,7 @@ impl<'a> Setup<'a> {
     /// Whether a surface returns a part of its echo in one wave.
     pub(super) fn has_waves(&self) -> bool {
         let beam_rad = Beam::new(self.geometry.radar).towards(0.0, 0.0).divergence_rad();
-        let facing = Direction::from_angles(0.0, 0.0);
-        let mut seen =
-            self.surfaces.iter().map(|surface| surface.seen_by(beam_rad, facing, facing));
-        seen.any(|seen| seen.coherent_share > 0.0)
+        self.surfaces.iter().any(|surface| surface.has_wave(beam_rad))
     }
 
     /// The sheet that a facet belongs to; `None` where nothing passes.

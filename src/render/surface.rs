@@ -56,6 +56,12 @@ impl<'a> Surface<'a> {
         let widening_rad = self.widening_rad(beam_rad);
         Seen { f_per_sr: self.scattering.seen_by(widening_rad, i, o).f_per_sr, ..seen }
     }
+
+    /// Whether it returns a part of an echo in one wave, to a beam of a divergence, rad.
+    pub(super) fn has_wave(&self, beam_rad: f64) -> bool {
+        let facing = Direction::from_angles(0.0, 0.0);
+        self.seen_by(beam_rad, facing, facing).coherent_share > 0.0
+    }
 }
 
 /// The orientation of the surface at a hit on a target that effects have moved.

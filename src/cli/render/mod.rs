@@ -70,7 +70,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     if !left.is_empty() {
         let folder = args.output.display();
         console.notice(&format!(
-            "{folder} also holds {} of another rendering; delete what you do not need",
+            "{folder} also holds {}, which this rendering did not write",
             left.join(", ")
         ));
     }

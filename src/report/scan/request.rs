@@ -62,8 +62,8 @@ pub struct RenderFiles<'a> {
 }
 
 impl RenderFiles<'_> {
-    /// Names of files in a folder that an earlier rendering wrote there and this one does not: of a receiver, a
-    /// polarisation or a beat signal that there is no longer.
+    /// Files in a folder that are named as those of a rendering and that this one does not write: mostly of a receiver, a
+    /// polarisation or a beat signal that an earlier one had.
     pub fn left_behind(&self, folder: &Path) -> Vec<String> {
         let entries = folder.read_dir().into_iter().flatten().flatten();
         let mut names: Vec<String> = entries

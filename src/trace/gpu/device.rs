@@ -110,7 +110,7 @@ impl Device {
 
     /// Number of chirps per call, at most `most`, with `shares` shares each.
     pub fn spots_at_once(&self, most: u64, shares: u64) -> usize {
-        let bytes = (size_of::<Spot>() as u64).max(shares * size_of::<[u32; 3]>() as u64);
+        let bytes = (size_of::<Spot>() as u64).max(shares * size_of::<[u32; 5]>() as u64);
         self.fitting(most, bytes, shares)
     }
 
