@@ -228,7 +228,15 @@ fn every_scan_has_its_own_material_and_seed() {
     bench.radar.speckle = Some(Speckle { looks: 3.0, ..Default::default() });
     bench.radar.noise =
         Some(Noise { level_dbm: Some(-95.0), range_sd_m: 0.002, ..Noise::default() });
-    let laws = ["aluminium", "mannequin-paint", "garment", "water-25c", "cotton", "human-skin"];
+    let laws = [
+        "aluminium",
+        "mannequin-paint",
+        "garment",
+        "water-25c",
+        "cotton",
+        "human-skin",
+        "concrete",
+    ];
     let laws = laws.map(builtin);
     let surfaces = laws.each_ref().map(|law| [Surface::new(law)]);
     let takes: Vec<Take> = surfaces

@@ -30,7 +30,7 @@ pub const COLUMNS: [&str; 9] = [
 /// A backscatter curve: observations in any order, each with a σ⁰ or the limit that it stayed below.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Curve {
-    /// One per chirp. Those that [`Curve::read`] and [`Curve::from_observations`] give leave out nothing but
+    /// One per chirp. Those that [`Curve::read`] and [`Curve::of_material`] give leave out nothing but
     /// the place on the target.
     pub observations: Vec<Observation>,
     /// How the target was lit, as far as it is stated.
