@@ -17,7 +17,7 @@
 use std::marker::PhantomData;
 use std::ops::Mul;
 
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec2, DVec3};
 
 /// `St`: origin at the secondary focus; x and y span the target plane, z is normal to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -125,6 +125,14 @@ impl Direction<Surface> {
         let (sin, cos) = theta_rad.sin_cos();
         let xyz = DVec3::new(sin * azimuth_rad.cos(), sin * azimuth_rad.sin(), cos);
         Direction { xyz, frame: PhantomData }
+    }
+
+    /// The direction of the same azimuth at another angle from the normal, given by its cosine, −1 to 1. On the
+    /// normal itself the azimuth is 0.
+    pub fn turned(&self, cos_theta: f64) -> Self {
+        let sin_theta = (1.0 - cos_theta * cos_theta).max(0.0).sqrt();
+        let aside = self.xyz.truncate().normalize_or(DVec2::X) * sin_theta;
+        Direction { xyz: aside.extend(cos_theta), frame: PhantomData }
     }
 
     /// The direction in which a mirror reflects this one.

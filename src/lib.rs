@@ -30,7 +30,7 @@
 //!
 //! | | |
 //! |---|---|
-//! | [`units`], [`frames`], [`geometry`] | numbers with units, coordinate frames as types, plain meshes and rasters |
+//! | [`units`], [`lanes`], [`frames`], [`geometry`] | numbers with units, loops in vector instructions, coordinate frames as types, plain meshes and rasters |
 //! | [`files`], [`mod@formats`], [`brdf`], [`radar`] | all files or none; bytes to plain data and back; how surfaces scatter; the instrument |
 //! | [`material`], [`scene`], [`trace`] | what is known of a surface; what is looked at; closest intersections |
 //! | [`effects`] | physical effects beyond the paper's model, one file each |
@@ -51,6 +51,7 @@
 // The order of these lines is the law: a module uses only modules declared above it
 // (`tests/floors.rs` checks it).
 pub mod units;
+pub mod lanes;
 pub mod frames;
 pub mod geometry;
 pub mod files;

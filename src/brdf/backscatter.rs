@@ -9,7 +9,17 @@
 
 use std::f64::consts::PI;
 
-use super::slopes::{Distribution, VIEWING_RAD};
+use super::slopes::{Distribution, VIEWING_RAD, beckmann, narrow_ggx, wide_ggx};
+use crate::lanes::{exp, ln};
+
+/// A look straight back at a surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Look {
+    /// Divergence of the beam, rad; 0 for none.
+    pub beam_rad: f64,
+    /// Cosine of the incidence angle.
+    pub cos_theta: f64,
+}
 
 /// One term of the sum.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,15 +48,18 @@ pub struct Facets {
 
 impl Facets {
     /// Roughness of the surface, without the beam of a divergence δ, rad.
+    #[inline(always)]
     pub(crate) fn m_without_beam(&self, beam_rad: f64) -> f64 {
         if self.includes_beam {
-            (self.m * self.m - beam_rad * beam_rad).max(0.0).sqrt()
+            let own2 = self.m * self.m - beam_rad * beam_rad;
+            if own2 > 0.0 { own2.sqrt() } else { 0.0 }
         } else {
             self.shadowing_m(beam_rad)
         }
     }
 
     /// Roughness for shadowing.
+    #[inline(always)]
     pub(crate) fn shadowing_m(&self, beam_rad: f64) -> f64 {
         if self.m == 0.0 && beam_rad == 0.0 { VIEWING_RAD } else { self.m }
     }
@@ -63,30 +76,66 @@ impl Term {
         Term { level_per_sr: reflectance / (4.0 * PI), cosines: -6.0, facets: Some(facets) }
     }
 
-    /// Its part of f, 1/sr, as a beam of the divergence `beam_rad` sees it; zero at grazing incidence.
-    pub(crate) fn per_sr(&self, beam_rad: f64, cos_theta: f64) -> f64 {
-        if cos_theta <= GRAZING {
-            return 0.0;
+    /// Its part of f, 1/sr; zero at grazing incidence.
+    pub(crate) fn per_sr(&self, look: Look) -> f64 {
+        let mut f_per_sr = [0.0];
+        self.add_per_sr(&[look], &mut f_per_sr);
+        f_per_sr[0]
+    }
+
+    /// Adds its part of f, 1/sr, of each look.
+    #[inline(always)]
+    pub(super) fn add_per_sr(&self, looks: &[Look], f_per_sr: &mut [f64]) {
+        let all = looks.iter().zip(&mut *f_per_sr);
+        match self.facets {
+            None => all.for_each(|(look, f)| *f += self.of_cosines(look)),
+            Some(facets) => match facets.distribution {
+                Distribution::Beckmann => {
+                    all.for_each(|(look, f)| *f += self.of_facets(&facets, look, beckmann));
+                }
+                // The two add up to the law: each is 0 where the other holds.
+                Distribution::Ggx => {
+                    all.for_each(|(look, f)| *f += self.of_facets(&facets, look, narrow_ggx));
+                    for (look, f) in looks.iter().zip(f_per_sr) {
+                        *f += self.of_facets(&facets, look, wide_ggx);
+                    }
+                }
+            },
         }
-        let facets = self.facets.map_or(1.0, |facets| {
-            let Facets { distribution, shadowed, .. } = facets;
-            let slope2 = 1.0 / (cos_theta * cos_theta) - 1.0;
-            let m2 = facets.m_without_beam(beam_rad).powi(2);
-            let seen = distribution.g1(cos_theta, facets.shadowing_m(beam_rad));
-            PI * distribution.density(slope2, m2, beam_rad * beam_rad)
-                * seen.powi(shadowed.cast_signed())
-        });
-        let (cosines, share) = match self.facets {
-            Some(_) => (self.cosines, 1.0),
-            None => seen_cosines(self.cosines, beam_rad),
-        };
-        let whole = cosines as i32;
-        let power = if f64::from(whole) == cosines {
-            cos_theta.powi(whole)
+    }
+
+    #[inline(always)]
+    fn of_cosines(&self, look: &Look) -> f64 {
+        let (cosines, share) = seen_cosines(self.cosines, look.beam_rad);
+        let lobe = self.level_per_sr * share * exp(cosines * ln(look.cos_theta));
+        if look.cos_theta > GRAZING { lobe } else { 0.0 }
+    }
+
+    /// The part of facets whose slopes have a density, of s², m² and δ².
+    #[inline(always)]
+    fn of_facets(
+        &self,
+        facets: &Facets,
+        look: &Look,
+        density: impl Fn(f64, f64, f64) -> f64,
+    ) -> f64 {
+        let Look { beam_rad, cos_theta } = *look;
+        let inverse2 = 1.0 / (cos_theta * cos_theta);
+        let m = facets.m_without_beam(beam_rad);
+        let density = density(inverse2 - 1.0, m * m, beam_rad * beam_rad);
+        let power = if self.cosines == -6.0 {
+            inverse2 * inverse2 * inverse2
         } else {
-            cos_theta.powf(cosines)
+            exp(self.cosines * ln(cos_theta))
         };
-        self.level_per_sr * share * power * facets
+        let g1 = facets.distribution.g1(cos_theta, facets.shadowing_m(beam_rad));
+        let shadowing = match facets.shadowed {
+            0 => 1.0,
+            1 => g1,
+            _ => g1 * g1,
+        };
+        let part = self.level_per_sr * PI * density * power * shadowing;
+        if cos_theta > GRAZING { part } else { 0.0 }
     }
 }
 
@@ -94,13 +143,11 @@ impl Term {
 /// near a Gaussian of slopes with m² = 2/a, to which δ² is added. That is the convolution within 0.06 dB down to 37 dB below
 /// the peak, for a beam up to a quarter as wide as the lobe. A lobe that is wider than the beam by a factor of 100 is
 /// seen as it is.
+#[inline(always)]
 pub(super) fn seen_cosines(cosines: f64, beam_rad: f64) -> (f64, f64) {
     let widened = 0.5 * cosines * beam_rad * beam_rad;
-    if widened < UNSEEN {
-        (cosines, 1.0)
-    } else {
-        (cosines / (1.0 + widened), 1.0 / (1.0 + widened))
-    }
+    let share = if widened < UNSEEN { 1.0 } else { 1.0 / (1.0 + widened) };
+    (cosines * share, share)
 }
 
 /// δ²/m² below which a beam changes f by less than this share.

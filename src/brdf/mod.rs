@@ -26,6 +26,7 @@ mod through_beam;
 mod validity;
 
 pub use albedo::{ALBEDO_SLACK, Excess, albedo, incidences_rad};
+pub(crate) use backscatter::Look;
 pub use backscatter::{Facets, Term};
 pub use beyond_beam::BeyondBeam;
 pub use kind::{Key, Kind};

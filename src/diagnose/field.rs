@@ -240,9 +240,7 @@ pub(super) fn scaled(mut prediction: Prediction, ln_factor: &[f64]) -> Predictio
 /// The part of every shot in the likelihood with factors on the means.
 pub(super) fn terms(problem: &Problem, prediction: &Prediction, ln_factor: &[f64]) -> Vec<Term> {
     let prediction = scaled(prediction.clone(), ln_factor);
-    let likelihood = Likelihood::new(&prediction, problem.declared, problem.shared);
-    let seen = problem.observations.iter().enumerate();
-    seen.map(|(shot, seen)| likelihood.term(shot, seen)).collect()
+    Likelihood::new(&prediction, problem.declared, problem.shared).terms(problem.observations)
 }
 
 /// Gain in ln p of every shot.

@@ -6,10 +6,13 @@
 //! ones. One in ten thousand chirps is an outlier of any power, so that a silhouette that the mesh misses
 //! costs a bounded amount.
 
+use rayon::prelude::*;
+
 use super::observation::{Observation, ReceiverLimits};
 use super::shared::SharedSpeckle;
-use crate::effects::{MeanEcho, Prediction};
+use crate::effects::Prediction;
 use crate::fit::gamma_law::{GammaLaw, LnProbability};
+use crate::lanes::{exp_all, ln_all};
 
 /// Share of outliers among chirps.
 const OUTLIERS: f64 = 1e-4;
@@ -26,6 +29,9 @@ const STRAY_WIDTH: f64 = 10.0;
 const UNSURE: f64 = 0.1;
 /// Mean power where rays miss, as a share of the threshold: never detected.
 const NOTHING: f64 = 1e-9;
+
+/// Shots that one task evaluates.
+const SHOTS_PER_TASK: usize = 256;
 
 /// The likelihood under one prediction.
 pub(super) struct Likelihood<'a> {
@@ -78,49 +84,81 @@ impl<'a> Likelihood<'a> {
         powers.map(move |(power_w, weight)| ((power_w + noise_w).max(floor_w).ln(), weight))
     }
 
-    /// ln of the mean over all tilts.
-    fn ln_mean(&self, shot: usize) -> f64 {
-        self.prediction.mean_w(shot).max(NOTHING * self.declared.threshold_w).ln()
+    /// The part of every shot.
+    pub fn terms(&self, observations: &[Observation]) -> Vec<Term> {
+        let tasks = observations.par_chunks(SHOTS_PER_TASK).enumerate();
+        let terms = tasks.map(|(task, some)| {
+            let seen: Vec<_> = (task * SHOTS_PER_TASK..).zip(some.iter().copied()).collect();
+            self.terms_of(&seen)
+        });
+        terms.collect::<Vec<_>>().concat()
     }
 
-    /// The part of one chirp.
-    pub fn term(&self, shot: usize, seen: &Observation) -> Term {
-        let ln_seen = seen.power_w.unwrap_or(self.declared.threshold_w).ln();
-        let (mut p, mut slope, mut bend, mut pull) = (0.0, 0.0, 0.0, 0.0);
-        for (ln_mean, weight) in self.ln_means(shot) {
-            let law = match seen.power_w {
-                Some(_) => self.detected(ln_seen, ln_mean),
-                None => self.limited(ln_seen, ln_mean),
-            };
-            let part = (1.0 - OUTLIERS) * weight * law.value.exp();
-            p += part;
-            slope += part * law.by_ln_mean;
-            pull += weight * law.by_ln_mean;
-            bend += part * law.bend;
+    /// The part of each of some shots. Exponentials and logarithms are taken of all shots at once, in vector
+    /// instructions.
+    pub fn terms_of(&self, seen: &[(usize, Observation)]) -> Vec<Term> {
+        let Likelihood { prediction, declared, .. } = *self;
+        let mut ln_seen: Vec<f64> =
+            seen.iter().map(|(_, seen)| seen.power_w.unwrap_or(declared.threshold_w)).collect();
+        ln_all(&mut ln_seen);
+        // The law of every power for every tilt.
+        let floor_w = NOTHING * declared.threshold_w;
+        let powers = seen.iter().map(|(shot, _)| prediction.powers_w(*shot));
+        let tilts = powers.clone().next().map_or(1, Iterator::count);
+        let noise_w = prediction.receiver.noise_w;
+        let mut ln_means: Vec<f64> =
+            powers.flatten().map(|(power_w, _)| (power_w + noise_w).max(floor_w)).collect();
+        ln_all(&mut ln_means);
+        let mut laws = Vec::with_capacity(ln_means.len());
+        for (ln_means, ((_, seen), ln_seen)) in
+            ln_means.chunks_exact(tilts).zip(seen.iter().zip(&ln_seen))
+        {
+            laws.extend(ln_means.iter().map(|ln_mean| match seen.power_w {
+                Some(_) => self.detected(*ln_seen, *ln_mean),
+                None => self.limited(*ln_seen, *ln_mean),
+            }));
         }
-        let anything = if seen.power_w.is_some() { OUTLIER_DENSITY } else { 0.5 };
-        let most = MOST_PULL * self.prediction.receiver.looks.sqrt();
-        let pull = pull.clamp(-most, most);
-        p += OUTLIERS * anything;
-        let ln_mean = self.ln_mean(shot);
-        let lost = self.entered(ln_mean, ln_seen).0 - ln_seen;
-        let arrived = self.prediction.arrived.get(shot).copied().flatten();
-        let range_m = arrived.map_or(0.0, |arrived| arrived.range_m);
-        let ranged = arrived.and_then(|arrived| self.range(&arrived, seen));
-        let [ln_range, range_slope, range_bend] = ranged.unwrap_or_default();
-        let weight = self.shared.weight(shot);
-        Term {
-            ln_p: weight * p.ln() + ln_range,
-            ln_mean: ln_mean - lost,
-            slope: weight * slope / p,
-            pull: weight * pull,
-            bend: weight * bend / p,
-            ln_range,
-            range_m,
-            range_slope,
-            range_bend,
-            weight,
+        let mut p_of_tilts: Vec<f64> = laws.iter().map(|law| law.value).collect();
+        exp_all(&mut p_of_tilts);
+        // Their means over the tilts.
+        let mut powers = Vec::with_capacity(seen.len());
+        for (place, (shot, seen)) in seen.iter().enumerate() {
+            let (mut mean, tilts) = (OfPower::default(), place * tilts..(place + 1) * tilts);
+            let weights = prediction.powers_w(*shot).map(|(_, weight)| weight);
+            for ((law, p), weight) in
+                laws[tilts.clone()].iter().zip(&p_of_tilts[tilts]).zip(weights)
+            {
+                mean.add((1.0 - OUTLIERS) * weight * p, weight, law);
+            }
+            mean.p += OUTLIERS * if seen.power_w.is_some() { OUTLIER_DENSITY } else { 0.5 };
+            powers.push(mean);
         }
+        let mut ln_p: Vec<f64> = powers.iter().map(|power| power.p).collect();
+        ln_all(&mut ln_p);
+        if tilts > 1 {
+            ln_means = seen.iter().map(|(shot, _)| prediction.mean_w(*shot).max(floor_w)).collect();
+            ln_all(&mut ln_means);
+        }
+        let ranges = self.ranges(seen);
+        let most_pull = MOST_PULL * prediction.receiver.looks.sqrt();
+        let each = seen.iter().zip(&ln_seen).zip(ln_means).zip(powers).zip(ln_p).zip(ranges);
+        each.map(|(((((&(shot, _), ln_seen), ln_mean), power), ln_p), range)| {
+            let weight = self.shared.weight(shot);
+            let arrived = prediction.arrived.get(shot).copied().flatten();
+            Term {
+                ln_p: weight * ln_p + range.ln_p,
+                ln_mean: ln_mean - (self.entered(ln_mean, *ln_seen).0 - ln_seen),
+                slope: weight * power.slope / power.p,
+                pull: weight * power.pull.clamp(-most_pull, most_pull),
+                bend: weight * power.bend / power.p,
+                ln_range: range.ln_p,
+                range_m: arrived.map_or(0.0, |arrived| arrived.range_m),
+                range_slope: range.slope,
+                range_bend: range.bend,
+                weight,
+            }
+        })
+        .collect()
     }
 
     /// Probability that the power of a shot stays below a level, W.
@@ -139,7 +177,8 @@ impl<'a> Likelihood<'a> {
     fn detected(&self, ln_power: f64, ln_mean: f64) -> LnProbability {
         let (ln_power, slope) = self.entered(ln_mean, ln_power);
         let law = self.law.detected(ln_power, ln_mean);
-        LnProbability { value: law.value - slope.ln(), ..law }
+        let ln_slope = if slope == 1.0 { 0.0 } else { slope.ln() };
+        LnProbability { value: law.value - ln_slope, ..law }
     }
 
     /// ln probability that the power stays below a limit.
@@ -154,17 +193,71 @@ impl<'a> Likelihood<'a> {
         (ln_mean + (ln_seen - passed.ln_mean) / passed.slope, passed.slope)
     }
 
-    /// ln p of a range, its slope and its curvature by the predicted range; `None` where no
-    /// range is to be used.
-    fn range(&self, arrived: &MeanEcho, seen: &Observation) -> Option<[f64; 3]> {
-        let sd_m = self.declared.range_sd_m;
-        let x = self.declared.range_off_m(arrived, seen)? / sd_m;
-        let spread = arrived.spread_m / sd_m;
-        let (width, stray_width) = ((UNSURE * spread).hypot(1.0), STRAY_WIDTH.max(spread));
-        let bell = |share: f64, width: f64| share / width * (-0.5 * (x / width).powi(2)).exp();
-        let (near, stray) = (bell(1.0 - STRAY_RANGES, width), bell(STRAY_RANGES, stray_width));
-        let p = (near + stray).max(f64::MIN_POSITIVE);
-        let weight = (near / width.powi(2) + stray / stray_width.powi(2)) / p;
-        Some([p.ln(), weight * x / sd_m, weight / (sd_m * sd_m)])
+    /// ln p of the range of each shot; 0 where none is to be used.
+    fn ranges(&self, seen: &[(usize, Observation)]) -> Vec<OfRange> {
+        let Likelihood { prediction, declared, .. } = *self;
+        let sd_m = declared.range_sd_m;
+        // How far a range is off, and how far the near and the stray ones spread, in standard deviations.
+        let off = seen.iter().map(|(shot, seen)| {
+            let arrived = prediction.arrived.get(*shot).copied().flatten()?;
+            let off = declared.range_off_m(&arrived, seen)? / sd_m;
+            let spread = arrived.spread_m / sd_m;
+            Some((off, (UNSURE * spread).hypot(1.0), STRAY_WIDTH.max(spread)))
+        });
+        let off: Vec<Option<(f64, f64, f64)>> = off.collect();
+        let (mut near, mut stray): (Vec<f64>, Vec<f64>) = off
+            .iter()
+            .map(|off| off.unwrap_or((0.0, 1.0, 1.0)))
+            .map(|(off, near, stray)| {
+                [near, stray].map(|width| -0.5 * (off / width).powi(2)).into()
+            })
+            .unzip();
+        exp_all(&mut near);
+        exp_all(&mut stray);
+        let mut found: Vec<OfRange> = Vec::with_capacity(seen.len());
+        for (off, (near, stray)) in off.iter().zip(near.iter().zip(&stray)) {
+            let Some((off, width, stray_width)) = *off else {
+                found.push(OfRange { p: 1.0, ..OfRange::default() });
+                continue;
+            };
+            let near = (1.0 - STRAY_RANGES) / width * near;
+            let stray = STRAY_RANGES / stray_width * stray;
+            let p = (near + stray).max(f64::MIN_POSITIVE);
+            let weight = (near / width.powi(2) + stray / stray_width.powi(2)) / p;
+            let (slope, bend) = (weight * off / sd_m, weight / (sd_m * sd_m));
+            found.push(OfRange { p, slope, bend, ..OfRange::default() });
+        }
+        let mut ln_p: Vec<f64> = found.iter().map(|range| range.p).collect();
+        ln_all(&mut ln_p);
+        found.iter_mut().zip(ln_p).for_each(|(range, ln_p)| range.ln_p = ln_p);
+        found
     }
+}
+
+/// The probability of a power, averaged over tilts, with p times its derivatives.
+#[derive(Clone, Copy, Default)]
+struct OfPower {
+    p: f64,
+    slope: f64,
+    pull: f64,
+    bend: f64,
+}
+
+impl OfPower {
+    /// Adds the law of one tilt, of a probability with the weight and of the weight alone.
+    fn add(&mut self, p: f64, weight: f64, law: &LnProbability) {
+        self.p += p;
+        self.slope += p * law.by_ln_mean;
+        self.pull += weight * law.by_ln_mean;
+        self.bend += p * law.bend;
+    }
+}
+
+/// The probability of a range, its slope and its curvature by the predicted range.
+#[derive(Clone, Copy, Default)]
+struct OfRange {
+    p: f64,
+    ln_p: f64,
+    slope: f64,
+    bend: f64,
 }

@@ -55,9 +55,7 @@ impl Problem<'_> {
 
     fn terms_of(&self, model: &Model) -> Vec<Term> {
         let prediction = model.predict_with(self.stage, self.shots, self.traced);
-        let likelihood = Likelihood::new(&prediction, self.declared, self.shared);
-        let seen = self.observations.par_iter().enumerate();
-        seen.map(|(shot, seen)| likelihood.term(shot, seen)).collect()
+        Likelihood::new(&prediction, self.declared, self.shared).terms(self.observations)
     }
 
     /// Slopes of every shot by every unknown: forward differences for scattering models, which are

@@ -129,17 +129,20 @@ pub(super) fn scores(
     let likelihood = Likelihood::new(prediction, declared, shared);
     let alone = Likelihood::new(prediction, declared, &ALONE);
     let table = MomentTable::new(prediction.receiver.looks);
-    let mut scores = Vec::new();
-    for (shot, seen) in observations.iter().enumerate().filter(|(shot, _)| wanted(*shot)) {
+    let seen = observations.iter().copied().enumerate().filter(|(shot, _)| wanted(*shot));
+    let seen: Vec<_> = seen.collect();
+    let terms = likelihood.terms_of(&seen);
+    let whole = if shared.is_any() { alone.terms_of(&seen) } else { terms.clone() };
+    let mut scores = Vec::with_capacity(seen.len());
+    for ((shot, seen), (term, whole)) in seen.into_iter().zip(terms.iter().zip(&whole)) {
         let [mean, variance] = detected_moments(&likelihood, &table, prediction, declared, shot);
         let missed = likelihood.below(shot, declared.threshold_w);
         let share = seen
             .power_w
             .map(|power_w| (likelihood.below(shot, power_w) - missed) / (1.0 - missed).max(1e-300));
-        let ln_p = likelihood.term(shot, seen).ln_p;
         let score = Score {
-            ln_p,
-            whole_ln_p: if shared.is_any() { alone.term(shot, seen).ln_p } else { ln_p },
+            ln_p: term.ln_p,
+            whole_ln_p: whole.ln_p,
             expected_w: mean.exp(),
             variance_db2: DB * DB * variance,
             residual_db: seen.power_w.map(|power_w| DB * (power_w.ln() - mean)),

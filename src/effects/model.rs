@@ -60,6 +60,9 @@ pub struct PredictionCache {
     gains: Cache<Vec<Key>, Vec<f64>>,
 }
 
+/// Shots that one task evaluates, so many that loops over them fill vector instructions.
+const SHOTS_PER_TASK: usize = 256;
+
 /// A shot where the effects place it, and the direction of the radar from its surface.
 type Intersection = (Shot, Direction<Surface>);
 
@@ -137,14 +140,13 @@ impl Model<'_> {
         let intersections = cache.intersections.get_or_make(moving.clone(), make);
         // f of the scattering models and the gains, in caches of their own, since they depend on different values.
         let f_per_sr = cache.scattered.get_or_make((self.laws.clone(), moving), || {
-            let laws: Vec<Retro> = self.laws.iter().map(Retro::new).collect();
-            of_every(&intersections, |shot, to_radar| {
-                let law = laws.get(usize::from(shot.region));
-                law.map_or(0.0, |law| law.per_sr(stage.widening_of_shot_rad(shot), to_radar))
-            })
+            let laws = self.retros();
+            let tasks = intersections.par_chunks(SHOTS_PER_TASK);
+            tasks.map(|shots| f_per_sr(stage, &laws, shots)).collect::<Vec<_>>().concat()
         });
         let gains = cache.gains.get_or_make(self.keys(|_| true), || {
-            of_every(&intersections, |shot, _| self.gain(stage, shot))
+            let shots = intersections.par_iter();
+            shots.map(|at| at.as_ref().map_or(0.0, |(shot, _)| self.gain(stage, shot))).collect()
         });
         // Equation (11), shot by shot.
         let mut arrived: Vec<Option<MeanEcho>> = intersections
@@ -182,13 +184,37 @@ impl Model<'_> {
         arrived: &[Option<MeanEcho>],
         receiver: &Receiver,
     ) -> Vec<Tilts> {
-        let shots = intersections.par_iter().zip(arrived);
-        shots
-            .map(|(intersection, echo)| match (intersection, echo) {
-                (Some((shot, _)), Some(echo)) => self.tilts(stage, shot, echo.power_w, receiver),
-                _ => Tilts::default(),
-            })
-            .collect()
+        let (laws, nodes) = (self.retros(), nodes(receiver.tilt_sd_rad));
+        let tasks =
+            intersections.par_chunks(SHOTS_PER_TASK).zip(arrived.par_chunks(SHOTS_PER_TASK));
+        let of_task = |(shots, arrived): (&[Option<Intersection>], &[Option<MeanEcho>])| {
+            let tilted = shots.iter().flat_map(|shot| nodes.map(|(by, _)| tilted(shot, by)));
+            let tilted: Vec<Option<Intersection>> = tilted.collect();
+            let f_per_sr = f_per_sr(stage, &laws, &tilted);
+            let power_w = |(at, f_per_sr): (&Option<Intersection>, &f64)| {
+                at.as_ref().map_or(0.0, |(shot, _)| {
+                    self.gain(stage, shot) * self.scattered_w(stage, shot, *f_per_sr)
+                })
+            };
+            let power_w: Vec<f64> = tilted.iter().zip(&f_per_sr).map(power_w).collect();
+            let of_shots = power_w.chunks_exact(NODES).zip(arrived);
+            let tilts = of_shots.map(|(power_w, arrived)| {
+                let Some(untilted_w) = arrived.map(|echo| echo.power_w) else {
+                    return Tilts::default();
+                };
+                std::array::from_fn(|node| {
+                    let factor = if untilted_w > 0.0 { power_w[node] / untilted_w } else { 0.0 };
+                    (factor, nodes[node].1)
+                })
+            });
+            tilts.collect::<Vec<Tilts>>()
+        };
+        tasks.map(of_task).collect::<Vec<_>>().concat()
+    }
+
+    /// The laws, to be asked for backscatter alone.
+    fn retros(&self) -> Vec<Retro<'_>> {
+        self.laws.iter().map(|law| Retro::new(law)).collect()
     }
 
     /// The shot at its intersection with the target where the effects place it; `None` if its ray misses.
@@ -321,26 +347,29 @@ impl Model<'_> {
     fn gain(&self, stage: &Stage, shot: &Shot) -> f64 {
         self.effects.iter().map(|(effect, values)| effect.gain(values, stage, shot)).product()
     }
-
-    /// The random tilts of a shot with the mean power `power_w`, W.
-    fn tilts(&self, stage: &Stage, shot: &Shot, power_w: f64, receiver: &Receiver) -> Tilts {
-        let theta_rad = shot.hit.theta_rad();
-        nodes(receiver.tilt_sd_rad).map(|(tilts, weight)| {
-            let tilted = tilted_cos_theta(theta_rad, tilts).map(|cos_theta| {
-                let hit = Hit { cos_theta, ..shot.hit };
-                self.power_w(stage, &Shot { hit, ..*shot })
-            });
-            let factor = if power_w > 0.0 { tilted.unwrap_or(0.0) / power_w } else { 0.0 };
-            (factor, weight)
-        })
-    }
 }
 
-/// A value of every intersection; 0 for a shot that misses.
-fn of_every(
-    intersections: &[Option<Intersection>],
-    number: impl Fn(&Shot, Direction<Surface>) -> f64 + Sync,
-) -> Vec<f64> {
-    let of_one = |(shot, to_radar): &Intersection| number(shot, *to_radar);
-    intersections.par_iter().map(|one| one.as_ref().map_or(0.0, of_one)).collect()
+/// f of the laws without effects, 1/sr, of every shot that hits the target; 0 of any other.
+fn f_per_sr(stage: &Stage, laws: &[Retro], shots: &[Option<Intersection>]) -> Vec<f64> {
+    let mut f_per_sr = vec![0.0; shots.len()];
+    for (region, law) in (0..).zip(laws) {
+        let hits = shots.iter().enumerate().filter_map(|(at, shot)| Some((at, shot.as_ref()?)));
+        let (places, looks): (Vec<usize>, Vec<_>) = hits
+            .filter(|(_, (shot, _))| shot.region == region)
+            .map(|(at, (shot, to_radar))| (at, (stage.widening_of_shot_rad(shot), *to_radar)))
+            .unzip();
+        for (at, one_per_sr) in places.into_iter().zip(law.per_sr(&looks)) {
+            f_per_sr[at] = one_per_sr;
+        }
+    }
+    f_per_sr
+}
+
+/// A shot with its normal tilted by these tangents, along the plane of incidence and across it; `None` if the facet then
+/// faces away.
+fn tilted(shot: &Option<Intersection>, by: [f64; 2]) -> Option<Intersection> {
+    let (shot, to_radar) = shot.as_ref()?;
+    let cos_theta = tilted_cos_theta(shot.hit.cos_theta, by)?;
+    let shot = Shot { hit: Hit { cos_theta, ..shot.hit }, ..*shot };
+    Some((shot, to_radar.turned(cos_theta)))
 }

@@ -21,9 +21,10 @@ const LEAST_COS_THETA: f64 = 1e-6;
 
 /// Cosine of the incidence angle after tilts of the normal by these tangents, along the plane of incidence and
 /// across it; `None` if the facet then faces away.
-pub fn tilted_cos_theta(theta_rad: f64, [along, across]: [f64; 2]) -> Option<f64> {
+pub fn tilted_cos_theta(cos_theta: f64, [along, across]: [f64; 2]) -> Option<f64> {
+    let sin_theta = (1.0 - cos_theta * cos_theta).max(0.0).sqrt();
     let length = (1.0 + along * along + across * across).sqrt();
-    let cos_theta = (theta_rad.cos() + along * theta_rad.sin()) / length;
+    let cos_theta = (cos_theta + along * sin_theta) / length;
     (cos_theta > LEAST_COS_THETA).then_some(cos_theta)
 }
 
@@ -53,10 +54,10 @@ mod tests {
 
     #[test]
     fn a_tilt_in_the_plane_of_incidence_is_a_step_in_theta() {
-        let tilted = tilted_cos_theta(0.5, [0.1f64.tan(), 0.0]).unwrap();
+        let tilted = tilted_cos_theta(0.5f64.cos(), [0.1f64.tan(), 0.0]).unwrap();
         assert!((tilted - 0.4f64.cos()).abs() < 1e-12);
-        let across = tilted_cos_theta(0.0, [0.0, 0.2f64.tan()]).unwrap();
+        let across = tilted_cos_theta(1.0, [0.0, 0.2f64.tan()]).unwrap();
         assert!((across - 0.2f64.cos()).abs() < 1e-12);
-        assert_eq!(tilted_cos_theta(1.5, [-0.2, 0.0]), None);
+        assert_eq!(tilted_cos_theta(1.5f64.cos(), [-0.2, 0.0]), None);
     }
 }

@@ -9,7 +9,7 @@ use nalgebra::DVector;
 
 use super::error::FitError;
 use super::table::Table;
-use crate::brdf::{Brdf, Mixture, Parameter, ThroughBeam};
+use crate::brdf::{Brdf, Mixture, Parameter};
 
 /// Name of the specular level S = (1 − k)·f_λ.
 pub(crate) const SPECULAR_LEVEL: &str = "S";
@@ -250,7 +250,7 @@ impl Coordinates {
 
     /// ln σ⁰ of the model at a point of the search, as the beam sees it.
     pub(super) fn table(&self, at: &DVector<f64>) -> Table {
-        Table::new(&ThroughBeam { law: &self.model(at), beam_rad: self.beam_rad })
+        Table::new(&self.model(at), self.beam_rad)
     }
 
     /// The chosen k, where backscatter does not determine it; `None` for a model without such a gauge.

@@ -4,6 +4,8 @@
 //! below x = L + 1 the series ln P = L·ln x − x − ln Γ(L) + ln Σ, above it ln(1 − Q) with Q by
 //! Lentz's continued fraction (Numerical Recipes, 3rd ed., §6.2; DLMF 8.7.1 and 8.9.2).
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use statrs::function::gamma::{digamma, ln_gamma};
 
 use super::table::lagrange;
@@ -77,8 +79,13 @@ pub(crate) struct GammaLaw {
     constant_slope: f64,
     /// √L, at least 1: how much narrower than that of one look the law is in ln power.
     narrowness: f64,
-    below: Vec<LnProbability>,
+    below: Arc<[LnProbability]>,
 }
+
+/// The tails of the latest laws by the bits of their looks: a search asks for the same ones over and over.
+static TAILS: Mutex<Vec<(u64, Arc<[LnProbability]>)>> = Mutex::new(Vec::new());
+/// How many tails are kept.
+const MOST_TAILS: usize = 16;
 
 /// ln(limit/mean) of the first knot of the tabulated tail, the step, both times the narrowness, and
 /// how many knots there are.
@@ -92,13 +99,12 @@ impl GammaLaw {
     /// The law of L looks, L > 0.
     pub fn new(looks: f64) -> GammaLaw {
         let narrowness = looks.sqrt().max(1.0);
-        let ln_ratios = (0..KNOTS).map(|knot| (FIRST + STEP * knot as f64) / narrowness);
         GammaLaw {
             looks,
             narrowness,
             ln_constant: looks * looks.ln() - ln_gamma(looks),
             constant_slope: looks * (looks.ln() + 1.0 - digamma(looks)),
-            below: ln_ratios.map(|ln_ratio| below(looks, ln_ratio)).collect(),
+            below: tail(looks, narrowness),
         }
     }
 
@@ -132,6 +138,25 @@ impl GammaLaw {
         sum.bend = sum.by_ln_mean.powi(2);
         sum
     }
+}
+
+/// The tabulated tail of the law of some looks.
+fn tail(looks: f64, narrowness: f64) -> Arc<[LnProbability]> {
+    let find = |tails: &[(u64, Arc<[LnProbability]>)]| {
+        let kept = tails.iter().find(|(bits, _)| *bits == looks.to_bits());
+        kept.map(|(_, tail)| tail.clone())
+    };
+    if let Some(kept) = find(&TAILS.lock().unwrap_or_else(PoisonError::into_inner)) {
+        return kept;
+    }
+    let ln_ratios = (0..KNOTS).map(|knot| (FIRST + STEP * knot as f64) / narrowness);
+    let made: Arc<[LnProbability]> = ln_ratios.map(|ln_ratio| below(looks, ln_ratio)).collect();
+    let mut tails = TAILS.lock().unwrap_or_else(PoisonError::into_inner);
+    if tails.len() >= MOST_TAILS {
+        tails.remove(0);
+    }
+    tails.push((looks.to_bits(), made.clone()));
+    made
 }
 
 /// ln of the probability of a power below the limit, and its derivatives; `ln_ratio` is ln(limit/mean).

@@ -245,7 +245,7 @@ mod tests {
 
     #[test]
     fn the_nearest_point_is_nearer_than_its_neighbours() {
-        let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002));
+        let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002), 0.0);
         for row in (Twin { rows: 100, ..Twin::default() }).curve(3).observations {
             let Some(level) = Level::new(&row) else { continue };
             let cost = Gap { table: &table, level: &level, deviations: TLS }.nearest().cost();

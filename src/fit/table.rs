@@ -5,10 +5,11 @@
 //! at θ = θ_end·sinh(βx)/sinh β, x uniform: dense at the specular peak, where the curve bends most.
 //! The curve is even in θ, which gives the knot below the first.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::LazyLock;
 
-use crate::brdf::Scattering;
+use crate::brdf::{Retro, Scattering};
+use crate::frames::{Direction, Surface};
 
 /// Intervals between knots.
 const INTERVALS: usize = 1024;
@@ -47,14 +48,16 @@ pub(super) struct Place {
 }
 
 impl Table {
-    /// Tabulates a model.
-    pub fn new(model: &dyn Scattering) -> Table {
-        Table::from_fn(|theta_rad| model.sigma0(theta_rad).ln().max(LN_NOTHING))
-    }
-
-    fn from_fn(value: impl Fn(f64) -> f64) -> Table {
-        let values = THETA_RAD.iter().map(|theta_rad| value(*theta_rad));
-        Table { knots: values.map(|v| if v.is_nan() { LN_NOTHING } else { v }).collect() }
+    /// Tabulates a law as a beam of the divergence `beam_rad` sees it; without a beam, 0, the law itself.
+    pub fn new(law: &dyn Scattering, beam_rad: f64) -> Table {
+        let looks = THETA_RAD.iter().map(|theta| (beam_rad, Direction::from_angles(*theta, 0.0)));
+        let looks: Vec<(f64, Direction<Surface>)> = looks.collect();
+        let f_per_sr = Retro::new(law).per_sr(&looks);
+        let ln_sigma0 = looks.iter().zip(f_per_sr).map(|((_, v), f_per_sr)| {
+            let ln_sigma0 = (4.0 * PI * f_per_sr * v.cos_theta().powi(2)).ln();
+            if ln_sigma0.is_nan() { LN_NOTHING } else { ln_sigma0.max(LN_NOTHING) }
+        });
+        Table { knots: ln_sigma0.collect() }
     }
 
     /// (self − other)/width at every knot: a derivative by a parameter.
@@ -144,7 +147,7 @@ mod tests {
 
     #[test]
     fn the_derivatives_are_those_of_the_value() {
-        let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002));
+        let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002), 0.0);
         for theta_rad in [-0.4, -1e-3, 0.0123, 0.071, 0.3, 1.1] {
             let (place, bends) = Place::bending(theta_rad);
             let at = |step: f64| table.at(&Place::new(theta_rad + step));
@@ -166,7 +169,7 @@ mod tests {
     fn interpolation_keeps_a_ten_thousandth_of_a_decibel_up_to_80_degrees() {
         for m in [0.01, 0.05, 0.2] {
             let model = mixture(m, 6.0, 0.05, 0.002);
-            let table = Table::new(&model);
+            let table = Table::new(&model, 0.0);
             for step in 0..40_000 {
                 let theta_rad = 80f64.to_radians() * f64::from(step) / 40_000.0;
                 let exact = model.sigma0(theta_rad).ln();
@@ -180,7 +183,7 @@ mod tests {
 
     #[test]
     fn the_slope_is_the_derivative_on_both_sides_of_the_normal() {
-        let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002));
+        let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002), 0.0);
         for theta_rad in [-0.12, -0.01, 0.002, 0.1, 0.7] {
             let at = |theta| table.at(&Place::new(theta));
             let expected = (at(theta_rad + 1e-6) - at(theta_rad - 1e-6)) / 2e-6;
@@ -191,7 +194,7 @@ mod tests {
 
     #[test]
     fn any_angle_has_a_place() {
-        let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002));
+        let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002), 0.0);
         for theta_rad in [-9.0, 0.0, 1.57, FRAC_PI_2, 3.0, f64::NAN, f64::INFINITY] {
             let value = table.at(&Place::new(theta_rad));
             assert!(value.is_finite() || theta_rad.is_nan(), "{theta_rad}: {value}");

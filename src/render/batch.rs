@@ -25,7 +25,7 @@ use super::path::{Arrival, Path};
 use super::setup::Setup;
 use super::spot::{self, Spot};
 use super::surface::Surface;
-use crate::brdf::Term;
+use crate::brdf::{Look, Term};
 use crate::frames::{Direction, Global, Pose, Ray};
 use crate::radar::{Detection, Footprint, Link};
 use crate::trace::{
@@ -429,7 +429,7 @@ fn have_waves_of(surface: &Surface, terms: &[Term], beam_rad: f64) -> bool {
     [0.0, 0.05, 0.3].into_iter().all(|theta_rad: f64| {
         let (mut whole, mut coherent) = (0.0, 0.0);
         for term in terms {
-            let per_sr = term.per_sr(beam_rad, theta_rad.cos());
+            let per_sr = term.per_sr(Look { beam_rad, cos_theta: theta_rad.cos() });
             let share = |m: f64| beam_rad * beam_rad / (m * m + beam_rad * beam_rad);
             whole += per_sr;
             coherent += per_sr * term.facets.map_or(0.0, |facets| share(facets.m));

@@ -257,7 +257,7 @@ fn tilted(shot: &Shot, [along, across]: [f64; 2]) -> Option<Shot> {
     if along == 0.0 && across == 0.0 {
         return Some(*shot);
     }
-    let cos_theta = tilted_cos_theta(shot.hit.theta_rad(), [along, across])?;
+    let cos_theta = tilted_cos_theta(shot.hit.cos_theta, [along, across])?;
     Some(Shot { hit: Hit { cos_theta, ..shot.hit }, ..*shot })
 }
 

@@ -6,9 +6,9 @@
 use super::boxes::{Boxes, PADDING, Sphere};
 use super::facet::{Line, plane_hit};
 use super::hit::Hit;
-use super::wide::{Wide, least, most, widest};
 use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;
+use crate::lanes::{Wide, least, most, widest};
 
 /// Boxes per node, and facets per block.
 const LANES: usize = 8;

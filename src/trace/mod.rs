@@ -21,7 +21,6 @@ mod scan;
 #[cfg(test)]
 mod testing;
 mod tracer;
-mod wide;
 
 pub use bvh::Bvh;
 pub use gpu::{Answer, Gpu, GpuError, GpuMesh};

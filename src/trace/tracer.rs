@@ -74,7 +74,9 @@ pub fn closest(bvh: &Bvh, rays: &[Ray<Global>]) -> Vec<Option<Hit>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::solids;
+    use crate::frames::Point;
+    use crate::lanes::at_most;
+    use crate::scene::{mannequin, solids};
     use crate::trace::testing;
 
     fn ray(from: [f64; 3], to: [f64; 3]) -> Ray<Global> {
@@ -122,5 +124,25 @@ mod tests {
         assert_eq!(Tracer::Automatic.closest(&Bvh::new(&mesh), &[]).unwrap(), []);
         let refused = Tracer::Pinhole.closest(&Bvh::new(&mesh), &[]);
         assert_eq!(refused, Err(NoFan::Count { rays: 0 }.into()));
+    }
+
+    #[test]
+    fn every_width_of_instructions_gives_the_same_hits() {
+        let body = mannequin::mannequin();
+        let origin = Point::new(0.0, 1.1, 8.0);
+        let towards = |k: u32| {
+            let [x, y] = [k % 120, k / 120].map(|i| 2.2 * (f64::from(i) + 0.3) / 120.0 - 1.1);
+            Ray { origin, direction: origin.towards(Point::new(x, y + 1.1, 0.0)).unwrap() }
+        };
+        let rays: Vec<_> = (0..120 * 120).map(towards).collect();
+        let hits = |bits: u32| {
+            at_most(bits, || {
+                let bvh = Bvh::new(&body);
+                [Tracer::Pinhole, Tracer::Bvh].map(|by| by.closest(&bvh, &rays).unwrap())
+            })
+        };
+        let [plain, of_256, of_512] = [128, 256, 512].map(hits);
+        assert!(plain[0].iter().flatten().count() > 1_000);
+        assert!(plain == of_256 && plain == of_512);
     }
 }

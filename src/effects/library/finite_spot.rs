@@ -5,7 +5,7 @@ use std::sync::{Arc, LazyLock};
 
 use rayon::prelude::*;
 
-use crate::brdf::{Brdf, Scattering, Term};
+use crate::brdf::{Brdf, Look, Scattering, Term};
 use crate::effects::cache::Cache;
 use crate::effects::echo::MeanEcho;
 use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level, Setting, Survey};
@@ -135,7 +135,9 @@ impl Spots {
             for term in terms {
                 let shape = Term { level_per_sr: 1.0, ..term };
                 let sums = self.sums.get_or_make((region, shape), || {
-                    self.sums(region, |beam_rad, v| shape.per_sr(beam_rad, v.cos_theta()))
+                    self.sums(region, |beam_rad, v| {
+                        shape.per_sr(Look { beam_rad, cos_theta: v.cos_theta() })
+                    })
                 });
                 answers.push((term.level_per_sr, sums));
             }

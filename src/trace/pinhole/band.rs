@@ -5,8 +5,8 @@ use std::ops::Range;
 use super::lanes::{Form, LANES, Nearest, ROUNDING};
 use super::patches::{Cells, Forms, NONE, Patches, blocks};
 use super::picture::Picture;
+use crate::lanes::{Wide, widest};
 use crate::trace::facet::{Line, range_to_plane_m};
-use crate::trace::wide::{Wide, widest};
 
 /// The rays of some rows of the grid, with the nearest of the facets that have been tested so far.
 pub(super) struct Band<'a> {

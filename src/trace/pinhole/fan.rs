@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use super::lanes::LANES;
 use crate::frames::{Global, Pose, Ray};
-use crate::trace::wide::{Wide, least, most, widest};
+use crate::lanes::{Wide, least, most, widest};
 
 /// Least cosine between a ray and the axis of its fan: 84°.
 const LEAST_COS: f64 = 0.1;

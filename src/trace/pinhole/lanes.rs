@@ -1,6 +1,6 @@
-//! Tests one facet against a block of rays in f32, by vector instructions ([`Wide`](crate::trace::wide::Wide)).
+//! Tests one facet against a block of rays in f32, by vector instructions ([`Wide`](crate::lanes::Wide)).
 
-use crate::trace::wide::least;
+use crate::lanes::least;
 
 /// Rays per block.
 pub(super) const LANES: usize = 16;

@@ -2,8 +2,8 @@
 
 use super::fan::Grid;
 use super::lanes::{Form, LANES, Lanes, ROUNDING};
+use crate::lanes::{least, most};
 use crate::trace::facet::GRAZING;
-use crate::trace::wide::{least, most};
 
 /// Stands for no facet.
 pub(super) const NONE: u32 = u32::MAX;

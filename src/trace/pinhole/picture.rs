@@ -7,7 +7,7 @@ use super::fan::Fan;
 use super::lanes::LANES;
 use super::patches::Patches;
 use crate::geometry::Mesh;
-use crate::trace::wide::{Wide, widest};
+use crate::lanes::{Wide, widest};
 
 /// Least cosine between a corner and the axis of the fan, 89.4°. Corners beyond are not projected.
 const LEAST_COS: f64 = 0.01;

@@ -3,7 +3,7 @@
 /// A computation of plain loops over arrays of fixed length, which the compiler turns into vector instructions.
 ///
 /// It must not fuse products with sums (FMA), so that every width gives the same bits.
-pub(super) trait Wide {
+pub(crate) trait Wide {
     /// The result.
     type Answer;
 
@@ -13,7 +13,7 @@ pub(super) trait Wide {
 
 /// Runs a computation with the widest instructions that the processor has.
 #[inline]
-pub(super) fn widest<W: Wide>(work: W) -> W::Answer {
+pub(crate) fn widest<W: Wide>(work: W) -> W::Answer {
     #[cfg(target_arch = "x86_64")]
     {
         if at_most_bits() >= 512 && is_x86_feature_detected!("avx512f") {
@@ -40,15 +40,32 @@ fn at_most_bits() -> u32 {
     512
 }
 
+/// The result of some work with instructions of at most this width, in bits. Such works wait for each other.
+#[cfg(test)]
+pub(crate) fn at_most<R>(bits: u32, work: impl FnOnce() -> R) -> R {
+    static ONE_AT_A_TIME: std::sync::Mutex<()> = std::sync::Mutex::new(());
+    let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    set_at_most(bits);
+    let found = work();
+    set_at_most(512);
+    found
+}
+
+#[cfg(test)]
+fn set_at_most(_bits: u32) {
+    #[cfg(target_arch = "x86_64")]
+    AT_MOST_BITS.store(_bits, std::sync::atomic::Ordering::Relaxed);
+}
+
 /// The smaller number, or `b` if `a` is NaN. It is a single instruction, unlike `f32::min`.
 #[inline(always)]
-pub(super) fn least(a: f32, b: f32) -> f32 {
+pub(crate) fn least(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
 /// The larger number, or `b` if `a` is NaN. It is a single instruction, unlike `f32::max`.
 #[inline(always)]
-pub(super) fn most(a: f32, b: f32) -> f32 {
+pub(crate) fn most(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
@@ -64,37 +81,5 @@ mod x86 {
     #[target_feature(enable = "avx2")]
     pub fn of_256_bits<W: Wide>(work: W) -> W::Answer {
         work.run()
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[cfg(test)]
-mod tests {
-    use std::sync::atomic::Ordering;
-
-    use super::*;
-    use crate::frames::{Point, Ray};
-    use crate::scene::mannequin;
-    use crate::trace::{Bvh, Tracer};
-
-    #[test]
-    fn every_width_gives_the_same_bits() {
-        let body = mannequin::mannequin();
-        let origin = Point::new(0.0, 1.1, 8.0);
-        let towards = |k: u32| {
-            let [x, y] = [k % 120, k / 120].map(|i| 2.2 * (f64::from(i) + 0.3) / 120.0 - 1.1);
-            Ray { origin, direction: origin.towards(Point::new(x, y + 1.1, 0.0)).unwrap() }
-        };
-        let rays: Vec<_> = (0..120 * 120).map(towards).collect();
-        let hits = |bits: u32| {
-            AT_MOST_BITS.store(bits, Ordering::Relaxed);
-            let bvh = Bvh::new(&body);
-            let found = [Tracer::Pinhole, Tracer::Bvh].map(|by| by.closest(&bvh, &rays).unwrap());
-            AT_MOST_BITS.store(512, Ordering::Relaxed);
-            found
-        };
-        let [plain, of_256, of_512] = [128, 256, 512].map(hits);
-        assert!(plain[0].iter().flatten().count() > 1_000);
-        assert!(plain == of_256 && plain == of_512);
     }
 }
