@@ -99,5 +99,6 @@ fn model(m: f64, drift: &dyn Effect, drift_db: f64) -> Model<'_> {
         laws: vec![paint],
         receiver: Receiver::LINEAR,
         effects: vec![(drift, values.collect())],
+        level: 1.0,
     }
 }

@@ -221,7 +221,9 @@ impl<'a> Publication<'a> {
     }
 
     fn scene_with(&self, materials: &[String]) -> SceneFile {
-        scene_with_found(&self.adoption.ready.scene, &self.adoption.report.effects, materials)
+        let Report { effects, base, .. } = &self.adoption.report;
+        let level_db = base.level_db.map(|level| level.value);
+        scene_with_found(&self.adoption.ready.scene, effects, level_db, materials)
     }
 
     /// The scene with what was found, for the folder of the report.

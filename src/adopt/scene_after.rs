@@ -16,10 +16,20 @@ pub const AFTER: &str = "after.toml";
 /// First line of a scene that a diagnosis wrote when it stored what it found, and may write again.
 pub const MARK: &str = "# Written by `matdb diagnose --add`, which may write it again.\n";
 
-/// The scene file with the effects of the scene and of the radar that were found; `materials` are the names that
-/// its regions get.
-pub fn scene_with_found(scene: &Scene, found: &[FoundEffect], materials: &[String]) -> SceneFile {
+/// The scene file with the effects of the scene and of the radar that were found, and the radar at the level that was
+/// found, dB over its settings; `materials` are the names that its regions get.
+pub fn scene_with_found(
+    scene: &Scene,
+    found: &[FoundEffect],
+    level_db: Option<f64>,
+    materials: &[String],
+) -> SceneFile {
     let mut file = scene.file.clone();
+    if let Some(level_db) = level_db {
+        // Two decimals are finer than any level is known.
+        let loss_db = file.radar.system_loss_db - level_db;
+        file.radar.system_loss_db = (100.0 * loss_db).round() / 100.0;
+    }
     file.effect.extend(entries(found, Level::Scene));
     file.radar.effect.extend(entries(found, Level::Instrument));
     for (region, material) in std::iter::zip(&mut file.region, materials) {

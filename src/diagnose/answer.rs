@@ -62,8 +62,14 @@ pub(super) fn base(subject: &Subject, state: &State, sd: &[f64]) -> Base {
         let value = Value { value: known.value, sd: finite(sd * known.slope), unit };
         parameters.push(BaseValue { region: known.region, name: known.name, value });
     }
+    let level_db = state.space.level_index().map(|index| Value {
+        value: DB * state.fit.at[index],
+        sd: sd.get(index).and_then(|sd| finite(DB * sd)),
+        unit: "dB",
+    });
     Base {
         parameters,
+        level_db,
         looks: receiver.looks,
         threshold_w: declared.threshold_w,
         noise_w: receiver.noise_w,

@@ -22,6 +22,8 @@ use super::support::Judge;
 use super::trial::{Search, Trial};
 use crate::effects::Effect;
 
+/// Most rounds, those included that begin again from a better base.
+const MOST_ROUNDS: usize = 12;
 /// Effects of one round of which pairs are tried.
 const MOST_PAIRED: usize = 4;
 /// Share of the best held-out gain from which an effect may yet prove better.
@@ -31,6 +33,8 @@ const MOST_RIVALS: usize = 2;
 
 /// The result of the choice.
 pub(super) struct Choice<'a> {
+    /// The model without effects.
+    pub base: State<'a>,
     pub model: Explanation<'a>,
     /// Every effect of every round.
     pub ranking: Vec<Candidate>,
@@ -42,13 +46,13 @@ pub(super) struct Choice<'a> {
 /// smaller than the structure that the model leaves.
 pub(super) fn choose_effects<'a>(
     search: &Search,
-    base: State<'a>,
+    mut base: State<'a>,
     effects: &[&'a dyn Effect],
 ) -> Choice<'a> {
     let scorer = &search.scorer;
     let mut ranking = Vec::new();
     let mut model = Explanation { state: base.clone(), added: Vec::new() };
-    for round in 1.. {
+    for round in 1..=MOST_ROUNDS {
         if model.added.len() >= scorer.settings.most_effects {
             break;
         }
@@ -59,6 +63,14 @@ pub(super) fn choose_effects<'a>(
         if !has_grown {
             break;
         }
+        if let Some(better) = scorer.better_base(&base, &model.state) {
+            (search.notify)(
+                "starting again: with an effect the laws have found a better place without it",
+            );
+            base = better;
+            model = Explanation { state: base.clone(), added: Vec::new() };
+            ranking.clear();
+        }
     }
     (search.notify)("testing whether each effect is needed");
     exchange(search, &mut model);
@@ -67,13 +79,13 @@ pub(super) fn choose_effects<'a>(
     let mut structure = model.remove_smaller_than_structure(scorer);
     // A model from which all effects were removed differs from the base in the last digits.
     if had_some && model.added.is_empty() {
-        model.state = base;
+        model.state = base.clone();
         structure = scorer.structure(&model.state);
     }
     let space = &model.state.space;
     model.added.iter_mut().for_each(|one| one.class.retain(|name| !space.has(name)));
     ranking.iter_mut().for_each(|one| one.accepted &= space.has(one.name));
-    Choice { model, ranking, structure }
+    Choice { base, model, ranking, structure }
 }
 
 /// A trial that the data support.

@@ -33,6 +33,7 @@ mod exchange;
 mod explanation;
 mod field;
 mod folds;
+mod level;
 mod likelihood;
 mod matching;
 mod observation;

@@ -5,8 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::DVector;
 use rayon::prelude::*;
 
+use super::level::MOST_OFF_DB;
 use super::likelihood::{Likelihood, Term};
 use super::observation::{Observation, ReceiverLimits};
+use super::score::DB;
 use super::shared::SharedSpeckle;
 use super::space::Space;
 use crate::effects::{Model, Prediction, PredictionCache, Receiver, Shot, Stage};
@@ -16,7 +18,7 @@ const SHIFT_STEP_M: f64 = 2e-3;
 /// Step of a difference quotient by an effect's parameter, in steps of the parameter.
 pub(super) const EFFECT_STEP: f64 = 0.25;
 /// Chirps of a sample; more take time and add little.
-const ENOUGH: usize = 2500;
+pub(super) const ENOUGH: usize = 2500;
 
 /// The data of a diagnosis.
 #[derive(Clone, Copy)]
@@ -48,9 +50,25 @@ impl Problem<'_> {
         self.terms_of(&space.model(self.receiver, at))
     }
 
-    /// ln likelihood of a point.
+    /// ln likelihood of a point, less what the scale of the laws takes ([`Space::prior`]).
     pub fn ln_likelihood(&self, space: &Space, at: &DVector<f64>) -> f64 {
-        ln_likelihood(&self.terms(space, at))
+        ln_likelihood(&self.terms(space, at)) - space.prior(at).value
+    }
+
+    /// ln of the level at which most detections are as strong as the stored laws have them.
+    pub fn ln_level(&self, space: &Space) -> f64 {
+        let prediction = self.predict(space, &space.start());
+        let mut off: Vec<f64> = (0..self.shots.len())
+            .filter_map(|shot| Some((self.observations[shot].power_w?, prediction.mean_w(shot))))
+            .filter(|(_, mean_w)| *mean_w > 0.0)
+            .map(|(power_w, mean_w)| (power_w / mean_w).ln())
+            .collect();
+        let middle = off.len() / 2;
+        if off.is_empty() {
+            return 0.0;
+        }
+        let (_, median, _) = off.select_nth_unstable_by(middle, f64::total_cmp);
+        median.clamp(-MOST_OFF_DB / DB, MOST_OFF_DB / DB)
     }
 
     fn terms_of(&self, model: &Model) -> Vec<Term> {
@@ -196,9 +214,9 @@ pub(super) struct Sample {
 }
 
 impl Sample {
-    /// A sample of the shots of a problem.
-    pub fn new(problem: &Problem) -> Sample {
-        let every = (problem.shots.len() / ENOUGH).max(1);
+    /// A sample of about `count` shots of a problem.
+    pub fn new(problem: &Problem, count: usize) -> Sample {
+        let every = (problem.shots.len() / count).max(1);
         let shots: Vec<Shot> = problem.shots.iter().step_by(every).copied().collect();
         let observations = problem.observations.iter().step_by(every).copied().collect();
         let weight = problem.shots.len() as f64 / shots.len().max(1) as f64;

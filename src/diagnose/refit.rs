@@ -9,9 +9,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::folds::Folds;
 use super::likelihood::Term;
-use super::problem::{EFFECT_STEP, Problem, Slope, ln_likelihood};
+use super::problem::{EFFECT_STEP, Problem, Slope};
 use super::space::Space;
 use crate::fit::minimise::{Local, Minimise, Stop};
+use crate::fit::shapes;
 use crate::fit::uncertainty::deviations;
 
 /// A full search.
@@ -35,6 +36,7 @@ const HALVINGS: usize = 5;
 #[derive(Clone, Debug)]
 pub(super) struct Fit {
     pub at: DVector<f64>,
+    /// ln likelihood, less what the scale of the laws takes ([`Space::prior`]).
     pub ln_likelihood: f64,
     pub converged: bool,
     /// No step from here improved, short ones neither: a further search would only repeat them.
@@ -79,15 +81,56 @@ impl Problem<'_> {
             start,
             bounds,
             |at| -self.ln_likelihood(space, at),
-            |at| {
-                let terms = self.terms(space, at);
-                let slopes = self.slopes_over(step, space, at, bounds, &terms);
-                local(&terms, &slopes, |_| true)
-            },
+            |at| self.local(step, space, at, bounds),
         );
         let (ln_likelihood, converged) = (-found.local.value, found.converged());
         let is_stuck = found.stop == Stop::Stuck;
         Fit { at: found.at, ln_likelihood, converged, is_stuck }
+    }
+
+    /// −ln likelihood near a point, with this step of the effects' parameters. Unknowns whose bounds are equal have
+    /// no slopes.
+    fn local(
+        &self,
+        step: f64,
+        space: &Space,
+        at: &DVector<f64>,
+        bounds: [&DVector<f64>; 2],
+    ) -> Local {
+        let terms = self.terms(space, at);
+        let slopes = self.slopes_over(step, space, at, bounds, &terms);
+        local(&terms, &slopes, |_| true).merge(space.prior(at))
+    }
+
+    /// Points from which the laws are searched beside their stored values: for each law, up to `count` that fit best
+    /// among shapes all over their ranges, with the other unknowns where `at` has them.
+    pub fn law_starts(&self, space: &Space, at: &DVector<f64>, count: usize) -> Vec<DVector<f64>> {
+        let mut all = Vec::new();
+        for (first, coordinates) in space.laws_with_places() {
+            let joined = |part: &DVector<f64>| {
+                let mut whole = at.clone();
+                whole.rows_mut(first, part.len()).copy_from(part);
+                whole
+            };
+            let others_held = space.bounds().map(|bounds| {
+                let mut held = at.clone();
+                held.rows_mut(first, coordinates.len())
+                    .copy_from(&bounds.rows(first, coordinates.len()));
+                held
+            });
+            let [lower, upper] = &others_held;
+            let found = shapes::starts(coordinates, count, |part| {
+                let whole = self.local(EFFECT_STEP, space, &joined(part), [lower, upper]);
+                let (place, len) = ((first, first), (part.len(), part.len()));
+                Local {
+                    value: whole.value,
+                    gradient: whole.gradient.rows(first, part.len()).into_owned(),
+                    curvature: whole.curvature.view(place, len).into_owned(),
+                }
+            });
+            all.extend(found.iter().map(joined));
+        }
+        all
     }
 
     /// The most likely points of fits without each fold in turn, by a full step from the most likely
@@ -105,11 +148,13 @@ impl Problem<'_> {
         let slopes = self.slopes(space, at, [&lower, &upper], &terms);
         (0..folds.folds).map(move |fold| {
             let local = local(&terms, &slopes, |shot| !folds.holds_out(fold, shot));
+            let local = local.merge(space.prior(at));
             let mut there = SEARCH.newton(at, [&lower, &upper], &local);
             // A step past the maximum is shortened.
-            let here = ln_likelihood_without(&terms, folds, fold);
+            let here = ln_likelihood_without(&terms, folds, fold) - space.prior(at).value;
             for _ in 0..HALVINGS {
-                if ln_likelihood_without(&self.terms(space, &there), folds, fold) >= here {
+                let terms = self.terms(space, &there);
+                if ln_likelihood_without(&terms, folds, fold) - space.prior(&there).value >= here {
                     return there;
                 }
                 there = 0.5 * (there + at);
@@ -131,7 +176,7 @@ impl Problem<'_> {
             of_effects.all(|slopes| slopes[shot].ln_mean.abs() * EFFECT_STEP < SMOOTH)
         });
         let axes = smooth.curvature.symmetric_eigen();
-        let mut best = (ln_likelihood(&terms), None);
+        let mut best = (self.ln_likelihood(space, at), None);
         for (axis, bend) in axes.eigenvectors.column_iter().zip(&axes.eigenvalues) {
             let reach = bend.max(f64::MIN_POSITIVE).sqrt().recip().min(1.0);
             for length in ALONG_AXES.iter().flat_map(|by| [by * reach, -by * reach]) {
@@ -160,11 +205,13 @@ impl Problem<'_> {
             let [power_a, power_b] = [a, b].map(|slope| slope.ln_p - slope.ln_range);
             power_a * power_b / term.weight + a.ln_range * b.ln_range
         };
+        let prior = space.prior(at);
         let mut products: DMatrix<f64> = DMatrix::zeros(free.len(), free.len());
         for (row, &i) in free.iter().enumerate() {
             for (column, &j) in free.iter().enumerate() {
                 let pairs = slopes[i].iter().zip(&slopes[j]);
-                products[(row, column)] = terms.iter().zip(pairs).map(product).sum();
+                let known: f64 = terms.iter().zip(pairs).map(product).sum();
+                products[(row, column)] = known + prior.curvature[(i, j)];
             }
         }
         let mut sd = vec![f64::INFINITY; at.len()];

@@ -39,7 +39,7 @@ impl Verdict {
 }
 
 /// A number and its standard deviation.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Value {
     /// Value.
     pub value: f64,
@@ -176,6 +176,8 @@ pub struct MeshPose {
 pub struct Base {
     /// Parameters of the scattering models, as fitted with the effects.
     pub parameters: Vec<BaseValue>,
+    /// Level of the radar over the one that its settings state, dB; none for a radar that was calibrated.
+    pub level_db: Option<Value>,
     /// Looks of speckle, as declared.
     pub looks: f64,
     /// Threshold, W, as declared.

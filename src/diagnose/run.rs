@@ -7,7 +7,7 @@ use super::error::DiagnoseError;
 use super::evidence::Candidate;
 use super::folds::Folds;
 use super::matching::MOST_STRAYS;
-use super::problem::{Problem, Sample};
+use super::problem::{ENOUGH, Problem, Sample};
 use super::remains::{Remainder, find_unexplained};
 use super::report::{Controls, Report, SCHEMA, Verdict};
 use super::residual;
@@ -57,25 +57,27 @@ impl Diagnosis {
 
         notify("refitting the scattering models");
         let space = Space::new(shots, receiver.looks, laws, at_work)?;
-        let base = scorer.base(&Sample::new(&alone), space);
+        let base = scorer.base(&Sample::new(&alone, ENOUGH), space);
         refuse_another_target(&scorer, &base)?;
         let shared = &scorer.shared_speckle(&base);
         let problem = Problem { shared, ..alone };
         let folds = &Folds::of_shared(shots, block_m, folds, seed);
         let folds = if shared.is_any() { folds } else { independent };
-        let (scorer, sample) = (Scorer { problem, folds, settings: self }, &Sample::new(&problem));
+        let (scorer, sample) =
+            (Scorer { problem, folds, settings: self }, &Sample::new(&problem, ENOUGH));
         let base = if shared.is_any() { scorer.again(&base) } else { base };
         let search = Search { scorer, sample, notify };
 
-        let choice = choose_effects(&search, base.clone(), effects);
+        let choice = choose_effects(&search, base, effects);
+        let base = &choice.base;
         let off_target = detections_off_target(&scorer, subject, &choice.model.state)?;
         refuse_a_poor_fit(&scorer.errors(&choice.model.state.held_out))?;
 
         notify("controls");
-        let controls = controls(&search, &base, effects, numbers_of_controls(&choice.ranking));
+        let controls = controls(&search, base, effects, numbers_of_controls(&choice.ranking));
 
         notify("testing the remainder");
-        Ok(report(subject, &scorer, &base, choice, off_target, controls))
+        Ok(report(subject, &scorer, &choice, off_target, controls))
     }
 }
 
@@ -83,17 +85,16 @@ impl Diagnosis {
 fn report(
     subject: &Subject,
     scorer: &Scorer,
-    base: &State,
-    Choice { model, ranking, structure }: Choice,
+    choice: &Choice,
     off_target: usize,
     controls: Controls,
 ) -> Report {
+    let Choice { base, model, ranking, structure } = choice;
     let State { space, fit, held_out } = &model.state;
     let prediction = &scorer.predict(&model.state);
     let [z_before, z] = [&scorer.predict(base), prediction].map(|prediction| scorer.z(prediction));
     let largest_db = model.largest().size_db;
-    let structure =
-        Some(&structure).filter(|structure| scorer.is_structured(structure, largest_db));
+    let structure = Some(structure).filter(|structure| scorer.is_structured(structure, largest_db));
     let remainder = Remainder { prediction, z: &z, structure, largest_db, off_target };
     let unexplained = find_unexplained(scorer, &remainder);
     // Held-out errors without and with the effects, and with the field.
@@ -108,8 +109,8 @@ fn report(
     Report {
         schema: SCHEMA,
         verdict: Verdict::new(!model.added.is_empty(), !unexplained.is_empty()),
-        effects: answer::effects(&model, &sd, subject.shots),
-        ranking,
+        effects: answer::effects(model, &sd, subject.shots),
+        ranking: ranking.clone(),
         unexplained,
         error: answer::before_after(scorer, errors, with_unknown),
         set_aside: subject.strays.len(),

@@ -22,6 +22,11 @@ pub(super) const SHARE_OF_FORM: f64 = 0.25;
 const FIELD_ERRORS: f64 = 3.0;
 /// Probability by chance below which the correlation of neighbours counts.
 const CHANCE: f64 = 1e-3;
+/// Shots on which shapes of laws all over their ranges are tried, and how many of them each law is searched from.
+const FEW: usize = 800;
+const LAW_STARTS: usize = 2;
+/// Difference in ln likelihood within which two fits have found the same optimum.
+const SAME_OPTIMUM: f64 = 0.5;
 /// Most looks in the first fit of the base, which starts far from the data, and in the test whether the data are
 /// of the right target.
 const WIDE_LOOKS: f64 = 4.0;
@@ -50,17 +55,34 @@ impl Scorer<'_> {
         State { space, fit, held_out }
     }
 
-    /// The model without effects. A sample gives the start.
-    pub fn base<'a>(&self, sample: &Sample, space: Space<'a>) -> State<'a> {
+    /// The model without effects. It is searched from the stored laws, and from the best of all shapes of each, on a
+    /// sample.
+    pub fn base<'a>(&self, sample: &Sample, mut space: Space<'a>) -> State<'a> {
+        if !self.problem.stage.geometry.radar.calibrated {
+            space.ln_level = Some(self.problem.ln_level(&space));
+        }
         let receiver = with_wide_speckle(self.problem.receiver);
         let wide = Problem { receiver, ..sample.problem(&self.problem) };
         let near = wide.fit(&space, &space.start(), &[], &SEARCH).at;
+        let few = Sample::new(&wide, FEW);
+        let elsewhere = few.problem(&wide).law_starts(&space, &near, LAW_STARTS);
+        let found = elsewhere.iter().map(|start| wide.fit(&space, start, &[], &SEARCH).at);
         // The scene's own scattering models may fit better, as to a cloud without speckle that it rendered.
-        let [ln_near, ln_own] =
-            [&near, &space.start()].map(|at| self.problem.ln_likelihood(&space, at));
-        let start = if ln_near > ln_own { near } else { space.start() };
+        let starts = found.chain([near, space.start()]);
+        let fits = starts.map(|start| (self.problem.ln_likelihood(&space, &start), start));
+        let best = fits.max_by(|a, b| a.0.total_cmp(&b.0));
+        let start = best.map_or(space.start(), |(_, start)| start);
         let fit = self.problem.fit(&space, &start, &[], &SEARCH);
         self.state(space, fit)
+    }
+
+    /// The base refitted from where the laws are beside the effects of a model, if that is likelier: the base then was
+    /// not at its optimum, and whatever moves it looks like an effect.
+    pub fn better_base<'a>(&self, base: &State<'a>, with: &State<'a>) -> Option<State<'a>> {
+        let laws = with.fit.at.rows(0, with.space.base_len()).into_owned();
+        let fit = self.problem.fit(&base.space, &laws, &[], &SEARCH);
+        let is_better = fit.ln_likelihood > base.fit.ln_likelihood + SAME_OPTIMUM;
+        is_better.then(|| self.state(base.space.clone(), fit))
     }
 
     /// A model, refitted from where it is.

@@ -23,6 +23,7 @@ const MOST_SCALE: f64 = 5.0;
 pub(super) struct Screen<'a> {
     pub problem: Problem<'a>,
     terms: Vec<Term>,
+    ln_likelihood: f64,
     slopes: Vec<Vec<Slope>>,
     /// Information on the model's own unknowns.
     absorbs: Option<Cholesky<f64, Dyn>>,
@@ -62,7 +63,8 @@ impl<'a> Screen<'a> {
         });
         let own: DVector<f64> = DVector::from_iterator(slopes.len(), pulls);
         let own_step = absorbs.as_ref().map_or(DVector::zeros(slopes.len()), |c| c.solve(&own));
-        Screen { problem, terms, slopes, absorbs, own_step, leaves_laws_open }
+        let ln_likelihood = problem.ln_likelihood(space, at);
+        Screen { problem, terms, ln_likelihood, slopes, absorbs, own_step, leaves_laws_open }
     }
 
     /// Gain in ln likelihood that a start promises.
@@ -87,7 +89,7 @@ impl<'a> Screen<'a> {
 
     /// Gain in ln likelihood at a point.
     pub fn gain(&self, space: &Space, at: &DVector<f64>) -> f64 {
-        self.problem.ln_likelihood(space, at) - ln_likelihood(&self.terms)
+        self.problem.ln_likelihood(space, at) - self.ln_likelihood
     }
 
     /// Gain in ln likelihood that a placebo with this number of parameters promises beside the model.

@@ -1,12 +1,15 @@
-//! The unknowns of a model: the coordinates of every scattering model that is fitted, and after them the
-//! parameters of the effects in units of their steps.
+//! The unknowns of a model: the coordinates of every scattering model that is fitted, after them ln of the radar's level
+//! where that is not calibrated, and after it the parameters of the effects in units of their steps.
 
 use nalgebra::DVector;
 
+use super::level::{MOST_OFF_DB, prior};
+use super::score::DB;
 use crate::brdf::Brdf;
 use crate::effects::{Effect, Model, Receiver, Shot, rank};
 use crate::fit::FitError;
 use crate::fit::coordinates::{Coordinates, frequencies};
+use crate::fit::minimise::Local;
 
 /// Chirps that must meet a region for its scattering model to be fitted.
 pub(crate) const LEAST_SHOTS: usize = 100;
@@ -19,6 +22,9 @@ pub(super) struct Space<'a> {
     laws: Vec<Brdf>,
     /// Regions whose scattering models are fitted, and the coordinates of these.
     free: Vec<(usize, Coordinates)>,
+    /// ln of the level of the radar over the one that its settings state, where a search starts; none for a radar that
+    /// was calibrated.
+    pub ln_level: Option<f64>,
     /// Effects at declared values.
     declared: &'a [(&'a dyn Effect, Vec<f64>)],
     pub effects: Vec<&'a dyn Effect>,
@@ -57,7 +63,7 @@ impl Shift<'_> {
 }
 
 impl<'a> Space<'a> {
-    /// A space without effects. Regions that fewer than [`LEAST_SHOTS`] chirps meet keep their scattering models.
+    /// A space without effects, for a radar of the level that its settings state. Regions that fewer than [`LEAST_SHOTS`] chirps meet keep their scattering models.
     pub fn new(
         shots: &[Shot],
         looks: f64,
@@ -72,7 +78,7 @@ impl<'a> Space<'a> {
                 free.push((region, coordinates));
             }
         }
-        Ok(Space { laws: laws.to_vec(), free, declared, effects: Vec::new() })
+        Ok(Space { laws: laws.to_vec(), free, ln_level: None, declared, effects: Vec::new() })
     }
 
     /// The space with one more effect.
@@ -155,24 +161,54 @@ impl<'a> Space<'a> {
         Some(Shift { effect, number, axis, step: effect.parameters()[number].step })
     }
 
-    /// Number of unknowns of the scattering models, which come first.
+    /// Number of unknowns of the scattering models and of the level, which come first.
     pub fn base_len(&self) -> usize {
+        self.laws_len() + usize::from(self.ln_level.is_some())
+    }
+
+    /// Number of those that belong to the scattering models.
+    fn laws_len(&self) -> usize {
         self.free.iter().map(|(_, coordinates)| coordinates.len()).sum()
     }
 
-    /// Start of the unknowns of the scattering models.
+    /// The unknown that is ln of the level; none for a calibrated radar.
+    pub fn level_index(&self) -> Option<usize> {
+        self.ln_level.map(|_| self.laws_len())
+    }
+
+    /// Each fitted law's coordinates, with the place of the first among all unknowns.
+    pub fn laws_with_places(&self) -> impl Iterator<Item = (usize, &Coordinates)> {
+        self.free.iter().scan(0, |next, (_, coordinates)| {
+            let first = *next;
+            *next += coordinates.len();
+            Some((first, coordinates))
+        })
+    }
+
+    /// What is added to −ln p, since data do not tell the level from the scale of the laws; nothing for a calibrated
+    /// radar.
+    pub fn prior(&self, at: &DVector<f64>) -> Local {
+        match self.ln_level {
+            Some(_) => prior(self.laws_with_places(), at),
+            None => Local::zero(at.len()),
+        }
+    }
+
+    /// Start of the unknowns of the scattering models and of the level.
     pub fn start(&self) -> DVector<f64> {
         let mut start = Vec::new();
         for (_, coordinates) in &self.free {
             start.extend(coordinates.start().iter());
         }
+        start.extend(self.ln_level);
         DVector::from_vec(start)
     }
 
     /// A point with the scattering models back at their start.
     pub fn restarted(&self, at: &DVector<f64>) -> DVector<f64> {
-        let effects = at.iter().skip(self.base_len());
-        DVector::from_vec(self.start().iter().chain(effects).copied().collect())
+        let (start, laws) = (self.start(), self.laws_len());
+        let others = at.iter().skip(laws);
+        DVector::from_vec(start.iter().take(laws).chain(others).copied().collect())
     }
 
     /// Two points about another that differ in one unknown. Scattering models are smooth, so that one of the
@@ -253,7 +289,8 @@ impl<'a> Space<'a> {
         let found = self.effects.iter().copied().zip(self.effect_values(at));
         let mut effects: Vec<_> = self.declared.iter().cloned().chain(found).collect();
         effects.sort_by_key(|(effect, _)| rank(effect.name()));
-        Model { laws, receiver, effects }
+        let level = self.level_index().map_or(1.0, |index| at[index].exp());
+        Model { laws, receiver, effects, level }
     }
 
     /// Least and largest value of every unknown.
@@ -262,6 +299,10 @@ impl<'a> Space<'a> {
         for (_, coordinates) in &self.free {
             lower.extend(coordinates.lower().iter());
             upper.extend(coordinates.upper().iter());
+        }
+        if self.ln_level.is_some() {
+            lower.push(-MOST_OFF_DB / DB);
+            upper.push(MOST_OFF_DB / DB);
         }
         for known in self.effects.iter().flat_map(|effect| effect.parameters()) {
             lower.push(known.min / known.step);

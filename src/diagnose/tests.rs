@@ -163,7 +163,7 @@ fn diagnosed_of(
     let noise_w = watts_from_dbm(-100.0);
     let receiver = Receiver { looks: 4.0, noise_w, ..Receiver::LINEAR };
     let declared = ReceiverLimits { threshold_w: watts_from_dbm(-77.0), range_sd_m: RANGE_SD_M };
-    let model = Model { laws: vec![law()], receiver, effects };
+    let model = Model { laws: vec![law()], receiver, effects, level: 1.0 };
     let prediction = model.predict(&stage, &shots);
     let seen = |(shot, arrived): (usize, &Option<crate::effects::MeanEcho>)| {
         let Some(arrived) = arrived else { return Observation::default() };

@@ -39,7 +39,7 @@ impl SceneEffects {
         let on_regions = self.on_regions.iter().map(|(e, v)| (e as &dyn Effect, v.clone()));
         let mut effects: Vec<_> = everywhere.chain(on_regions).collect();
         effects.sort_by_key(|(effect, _)| rank(effect.name()));
-        Model { laws, receiver, effects }
+        Model { laws, receiver, effects, level: 1.0 }
     }
 }
 

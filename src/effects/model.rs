@@ -28,6 +28,8 @@ pub struct Model<'a> {
     pub receiver: Receiver,
     /// The effects, in the order in which they act.
     pub effects: Vec<(&'a dyn Effect, Vec<f64>)>,
+    /// Factor on every echo, as a ratio: the level of the radar over the one that its settings state.
+    pub level: f64,
 }
 
 /// The prediction of a model for the shots of a scan.
@@ -167,6 +169,9 @@ impl Model<'_> {
         };
         // Effects on all shots together come last.
         self.arrive(stage, shots, cache, &mut arrived);
+        for echo in arrived.iter_mut().flatten() {
+            echo.power_w *= self.level;
+        }
         Prediction { arrived, tilts, saturating: receiver.saturating(), receiver }
     }
 

@@ -87,7 +87,7 @@ impl Bench {
 
     pub(super) fn predict(&self, effects: Vec<(&dyn Effect, Vec<f64>)>) -> Prediction {
         let receiver = Receiver { looks: 4.0, noise_w: 1e-13, ..Receiver::LINEAR };
-        Model { laws: vec![self.law.clone()], receiver, effects }
+        Model { laws: vec![self.law.clone()], receiver, effects, level: 1.0 }
             .predict(&self.stage(), &self.shots)
     }
 
@@ -95,7 +95,7 @@ impl Bench {
     pub(super) fn moved(&self, effect: &dyn Effect, values: &[f64], shot: &Shot) -> Option<Shot> {
         let effects = vec![(effect, values.to_vec())];
         let receiver = Receiver::LINEAR;
-        Model { laws: Vec::new(), receiver, effects }.placed(&self.stage(), *shot)
+        Model { laws: Vec::new(), receiver, effects, level: 1.0 }.placed(&self.stage(), *shot)
     }
 
     /// What arrives without any effect.
@@ -238,7 +238,7 @@ fn no_beam_widens_a_lobe_that_includes_one() {
     for name in [None, Some("finite-spot")] {
         let effect = name.and_then(find).map(|effect| (effect as &dyn Effect, vec![0.016]));
         let laws = vec![bench.law.clone()];
-        let model = Model { laws, receiver, effects: Vec::from_iter(effect) };
+        let model = Model { laws, receiver, effects: Vec::from_iter(effect), level: 1.0 };
         let echoes = |stage| model.predict(stage, &bench.shots).arrived;
         let (own, with_beam) = (echoes(&own_stage), echoes(&stage));
         // The shot at the middle of the plate meets it at normal incidence.

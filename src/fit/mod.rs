@@ -36,12 +36,12 @@ mod run;
 mod search;
 mod sensitivity;
 mod settings;
-mod shapes;
+pub(crate) mod shapes;
 mod stored;
 mod summary;
 mod table;
 #[cfg(test)]
-mod twin;
+pub(crate) mod twin;
 pub(crate) mod uncertainty;
 mod verdict;
 

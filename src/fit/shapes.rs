@@ -33,7 +33,7 @@ pub(super) fn sample(rows: &[Observation]) -> Vec<Observation> {
 }
 
 /// Up to `count` starts, the best first; none of a law without shapes. `cost` is that of the sample.
-pub(super) fn starts(
+pub(crate) fn starts(
     coordinates: &Coordinates,
     count: usize,
     cost: impl Fn(&DVector<f64>) -> Local + Sync,

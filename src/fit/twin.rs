@@ -14,7 +14,7 @@ use crate::units::watts_from_dbm;
 const RANGE_M: f64 = 8.0;
 
 /// The paper's mixture from the four parameters that backscatter determines, with k = 0.1.
-pub(super) fn mixture(m: f64, alpha: f64, s: f64, r: f64) -> Brdf {
+pub(crate) fn mixture(m: f64, alpha: f64, s: f64, r: f64) -> Brdf {
     let specular = CookTorrance {
         f_lambda: s / 0.9,
         m,

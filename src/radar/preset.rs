@@ -18,6 +18,7 @@ impl Default for Radar {
             transmit_power_dbm: 7.0,
             aperture_m2: None,
             system_loss_db: 12.5,
+            calibrated: false,
             threshold_dbm: -77.0,
             returns: Returns::default(),
             footprint: Footprint::Paper,

@@ -44,6 +44,10 @@ pub struct Radar {
     /// Two-way losses and calibration, dB. 12.5: assumed, so that a painted mannequin's specular peak
     /// lands where the paper's figure 9 has it.
     pub system_loss_db: f64,
+    /// Whether `system_loss_db` was measured, so that a diagnosis takes the level of the radar as it is. false: a
+    /// diagnosis finds how far the level is off.
+    #[serde(skip_serializing_if = "is_off")]
+    pub calibrated: bool,
     /// Detections below this power are discarded, dBm. −77: paper, Sec. V-C.
     pub threshold_dbm: f64,
     /// Which echoes of a chirp are reported where several part in range. `strongest`: paper, one point per chirp.

@@ -267,7 +267,7 @@ mod tests {
             let laws = vec![Brdf::Lambert(Lambert { albedo })];
             let receiver = Receiver { looks: 4.0, noise_w: 0.0, ..Receiver::LINEAR };
             let total = |effects| -> f64 {
-                let model = Model { laws: laws.clone(), receiver, effects };
+                let model = Model { laws: laws.clone(), receiver, effects, level: 1.0 };
                 let found = model.predict(&corner.stage(), &corner.shots);
                 found.arrived.iter().flatten().map(|one| one.power_w).sum()
             };

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::diagnose::{Base, BaseValue, MeshPose, Report};
+use crate::diagnose::{Base, BaseValue, MeshPose, Report, Value};
 use crate::report::choice::UntriedEffect;
 use crate::units::dbm_from_watts;
 
@@ -26,6 +26,8 @@ impl<'a> CloudRecord<'a> {
 #[derive(Serialize)]
 pub(super) struct BaseRecord<'a> {
     parameters: &'a [BaseValue],
+    /// Null for a radar that was calibrated.
+    level_db: Option<Value>,
     looks: f64,
     threshold_dbm: f64,
     /// Null for a receiver without noise.
@@ -39,6 +41,7 @@ impl<'a> BaseRecord<'a> {
     pub fn new(base: &'a Base) -> BaseRecord<'a> {
         BaseRecord {
             parameters: &base.parameters,
+            level_db: base.level_db,
             looks: base.looks,
             threshold_dbm: dbm_from_watts(base.threshold_w),
             noise_dbm: (base.noise_w > 0.0).then(|| dbm_from_watts(base.noise_w)),

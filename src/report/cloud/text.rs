@@ -21,6 +21,13 @@ pub(super) fn text(report: &Report, peaks: &[Peak], files: &[String], folder: &P
     if let Some(places) = places::words(peaks) {
         text += &format!("  {places}\n");
     }
+    if let Some(level_db) = &report.base.level_db {
+        text += &format!(
+            "level of the radar: {} dB over its settings, {}\n",
+            plus_minus(level_db.value, level_db.sd.unwrap_or(f64::INFINITY)),
+            "as far as the stored scale of its materials is right"
+        );
+    }
     if report.set_aside > 0 {
         text += &format!(
             "set aside: {} detections that lie elsewhere than their chirps meet the target\n",
