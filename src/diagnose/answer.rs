@@ -31,8 +31,8 @@ pub(super) fn rows(
         rows.push(Row {
             chirp: shot.chirp,
             observed_w: seen.power_w,
-            before_w: before.state.held_out[index].expected_w,
-            after_w: after.state.held_out[index].expected_w,
+            before_w: before.state.held_out.shots[index].expected_w,
+            after_w: after.state.held_out.shots[index].expected_w,
             z_before: before.z[index],
             z_after: after.z[index],
             fold: folds.fold[index],

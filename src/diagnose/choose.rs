@@ -15,8 +15,7 @@ use super::exchange::{SAME, exchange};
 use super::explanation::{Addition, Explanation};
 use super::field::Structure;
 use super::refit::{Fit, SCOUT};
-use super::score::Score;
-use super::scorer::State;
+use super::scorer::{HeldOut, State};
 use super::space::Space;
 use super::support::Judge;
 use super::trial::{Search, Trial};
@@ -92,7 +91,7 @@ pub(super) fn choose_effects<'a>(
 struct Contender {
     /// Its place among the trials.
     trial: usize,
-    held_out: Vec<Score>,
+    held_out: HeldOut,
     /// The gain that counts.
     gain: f64,
 }
@@ -124,11 +123,17 @@ fn add_best<'a>(search: &Search, model: &mut Explanation<'a>, trials: &mut [Tria
         space.parameters_in_use(&fit.at)
     });
     let best = best.map_or(first, |best| *best);
-    let class = tied.iter().filter(|one| one.trial != best.trial);
-    let class = class.map(|one| trials[one.trial].candidate.name).collect();
+    let name = trials[best.trial].candidate.name;
+    let mut class: Vec<&'static str> = Vec::new();
+    for other in tied.iter().map(|one| trials[one.trial].candidate.name) {
+        if other != name && !class.contains(&other) {
+            class.push(other);
+        }
+    }
     let rivals = contenders
         .iter()
-        .filter(|one| one.trial != best.trial && one.gain >= SHARE_OF_RIVAL * first.gain)
+        .filter(|one| trials[one.trial].candidate.name != name)
+        .filter(|one| one.gain >= SHARE_OF_RIVAL * first.gain)
         .take(MOST_RIVALS)
         .map(|one| trials[one.trial].effect)
         .collect();
@@ -211,7 +216,7 @@ fn best_pair<'t, 'a>(
     beaten.truncate(MOST_PAIRED);
     let mut pairs = Vec::new();
     for (index, &a) in beaten.iter().enumerate() {
-        for &b in &beaten[index + 1..] {
+        for &b in beaten[index + 1..].iter().filter(|b| b.candidate.name != a.candidate.name) {
             let space = a.space.with(b.effect);
             let start = a.fit.at.iter().chain(b.fit.at.iter().skip(state.fit.at.len()));
             let start = DVector::from_vec(start.copied().collect());

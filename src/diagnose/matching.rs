@@ -5,6 +5,7 @@ use std::collections::{HashMap, HashSet};
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::alarms::{Alarms, MOST_OVER_THRESHOLD};
 use super::error::DiagnoseError;
 use super::observation::Observation;
 use crate::effects::{Model, Shot, Stage};
@@ -43,8 +44,10 @@ impl Stray {
 pub struct CloudMatch {
     /// One for each shot.
     pub observations: Vec<Observation>,
-    /// Detections that belong to no shot.
+    /// Detections that belong to no shot and are no false alarms.
     pub strays: Vec<Stray>,
+    /// What the chirps report that see no target.
+    pub alarms: Alarms,
 }
 
 /// Assigns the points of a cloud to the shots of its scan, by chirp numbers or, without them, by directions. A detection
@@ -59,8 +62,9 @@ pub fn match_cloud(
     cloud: &Cloud,
     chirps: &Chirps,
     shots: &[Shot],
+    threshold_w: f64,
 ) -> Result<CloudMatch, DiagnoseError> {
-    let scan = Scan::new(chirps);
+    let scan = Scan { threshold_w, ..Scan::new(chirps) };
     let is_numbered = cloud.points().iter().all(|point| point.chirp.is_some());
     if !is_numbered && scan.directions.is_none() {
         return Err(DiagnoseError::Unnumbered);
@@ -97,9 +101,13 @@ struct Assignment {
 }
 
 impl Assignment {
+    /// Whether most of the cloud is of the target. False alarms are nobody's, as long as they are not the most.
     fn is_of_target(&self, cloud: &Cloud) -> bool {
         let points = cloud.points().len();
-        (points - self.on_target) as f64 <= MOST_STRAYS * points as f64
+        let alarms = self.cloud_match.alarms.powers_w.len();
+        let others = points - self.on_target;
+        (others - alarms.min(others)) as f64 <= MOST_STRAYS * (points - alarms) as f64
+            && alarms <= points / 2
     }
 }
 
@@ -107,6 +115,8 @@ impl Assignment {
 struct Scan<'a> {
     chirps: &'a Chirps,
     index_of_chirp: HashMap<u32, usize>,
+    /// Up to so many times this power a detection without a target may be a false alarm, W.
+    threshold_w: f64,
     /// `None` unless all rays start from one point.
     directions: Option<Directions>,
 }
@@ -114,7 +124,8 @@ struct Scan<'a> {
 impl Scan<'_> {
     fn new(chirps: &Chirps) -> Scan<'_> {
         let index_of_chirp = chirps.number.iter().copied().zip(0..).collect();
-        Scan { chirps, index_of_chirp, directions: Directions::new(chirps) }
+        let directions = Directions::new(chirps);
+        Scan { chirps, index_of_chirp, threshold_w: 0.0, directions }
     }
 
     /// The ray of a chirp.
@@ -179,6 +190,8 @@ impl Scan<'_> {
         let mut observations = vec![Observation::default(); shots.len()];
         let (mut strays, mut on_target, mut second) = (Vec::new(), 0, 0);
         let mut past_the_edge = HashSet::new();
+        let (mut alarms, mut spoke) = (Alarms { weight: 1.0, ..Alarms::default() }, HashSet::new());
+        let most_w = MOST_OVER_THRESHOLD * self.threshold_w;
         for point in cloud.points() {
             let chirp = if by_number { point.chirp } else { self.chirp_towards(point.point) };
             let index = chirp.and_then(|chirp| shot_of_chirp.get(&chirp).copied());
@@ -192,6 +205,8 @@ impl Scan<'_> {
                     on_target += 1;
                     let power_w = Some(point.power_w);
                     *observation = Observation { power_w, range_m: Some(range_m) };
+                } else if !is_near && point.power_w <= most_w && spoke.insert(shot.chirp) {
+                    alarms.powers_w.push(point.power_w);
                 } else {
                     second += usize::from(is_near);
                     strays.push(Stray { shot: Some(*shot), range_m });
@@ -201,17 +216,27 @@ impl Scan<'_> {
                 let sent = chirp.and_then(|chirp| self.index_of_chirp.get(&chirp).copied());
                 let shot = sent.map(|index| Shot::missed(self.chirps, index, progress[index]));
                 let range_m = shot.map_or(0.0, |shot| range_m(point, &shot));
-                if let Some(shot) = shot
-                    && is_past_an_edge(point, &shot, target.as_ref())
-                {
-                    let is_first = past_the_edge.insert(shot.chirp);
-                    on_target += usize::from(is_first);
-                    second += usize::from(!is_first);
+                if let Some(shot) = shot {
+                    let is_past = is_past_an_edge(point, &shot, target.as_ref());
+                    let is_on_ray = off_ray_m(point, &shot.ray).length() <= ON_RAY_M;
+                    if is_past {
+                        let is_first = past_the_edge.insert(shot.chirp);
+                        on_target += usize::from(is_first);
+                        second += usize::from(!is_first);
+                    } else if is_on_ray && point.power_w <= most_w && spoke.insert(shot.chirp) {
+                        alarms.powers_w.push(point.power_w);
+                        continue;
+                    }
                 }
                 strays.push(Stray { shot, range_m });
             }
         }
-        Assignment { cloud_match: CloudMatch { observations, strays }, on_target, second }
+        // Silent are the chirps that miss, and those whose target is too weak.
+        let detected = observations.iter().filter(|seen| seen.power_w.is_some()).count();
+        let spoken = detected + spoke.len() + past_the_edge.len();
+        alarms.silent = self.chirps.rays.len().saturating_sub(spoken);
+        let cloud_match = CloudMatch { observations, strays, alarms };
+        Assignment { cloud_match, on_target, second }
     }
 }
 

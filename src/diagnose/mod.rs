@@ -22,6 +22,7 @@
 //! | the report | `report.rs`, `answer.rs` |
 //! | the diagnosis of a measured curve | `curve/` |
 
+mod alarms;
 mod answer;
 mod choose;
 mod controls;
@@ -62,6 +63,7 @@ mod support;
 mod tests;
 mod trial;
 
+pub use alarms::Alarms;
 pub use error::DiagnoseError;
 pub use evidence::{Candidate, Evidence};
 pub use folds::Folds;

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::DVector;
 use rayon::prelude::*;
 
+use super::alarms::Alarms;
 use super::level::MOST_OFF_DB;
 use super::likelihood::{Likelihood, Term};
 use super::observation::{Observation, ReceiverLimits};
@@ -12,6 +13,7 @@ use super::score::DB;
 use super::shared::SharedSpeckle;
 use super::space::Space;
 use crate::effects::{Model, Prediction, PredictionCache, Receiver, Shot, Stage};
+use crate::fit::minimise::Local;
 
 /// Shift of the target in a difference quotient, m per step of an effect's parameter.
 const SHIFT_STEP_M: f64 = 2e-3;
@@ -28,6 +30,8 @@ pub(super) struct Problem<'a> {
     pub observations: &'a [Observation],
     pub declared: ReceiverLimits,
     pub receiver: Receiver,
+    /// What the chirps report that see no target.
+    pub alarms: &'a Alarms,
     /// How much of its speckle each shot has to itself.
     pub shared: &'a SharedSpeckle,
     /// Rays already traced for these shots.
@@ -52,7 +56,43 @@ impl Problem<'_> {
 
     /// ln likelihood of a point, less what the scale of the laws takes ([`Space::prior`]).
     pub fn ln_likelihood(&self, space: &Space, at: &DVector<f64>) -> f64 {
-        ln_likelihood(&self.terms(space, at)) - space.prior(at).value
+        ln_likelihood(&self.terms(space, at)) + self.beside(space, at)
+    }
+
+    /// What is added to ln p of the shots: of the chirps that see no target, less what the scale of the laws takes.
+    pub fn beside(&self, space: &Space, at: &DVector<f64>) -> f64 {
+        self.ln_p_of_alarms(space, at) - space.prior(at).value
+    }
+
+    /// ln likelihood of the chirps that see no target.
+    pub fn ln_p_of_alarms(&self, space: &Space, at: &DVector<f64>) -> f64 {
+        self.alarms.ln_p(&space.received(self.receiver, at), self.declared)
+    }
+
+    /// −[`Problem::beside`] near a point. Only effects on the receiver change false alarms, by their own unknowns.
+    pub fn local_beside(
+        &self,
+        space: &Space,
+        at: &DVector<f64>,
+        [lower, upper]: [&DVector<f64>; 2],
+    ) -> Local {
+        let mut local = space.prior(at);
+        let here = self.ln_p_of_alarms(space, at);
+        local.value -= here;
+        for index in space.base_len()..at.len() {
+            let ends = [EFFECT_STEP, -EFFECT_STEP].map(|by| {
+                let mut there = at.clone();
+                there[index] = (at[index] + by).clamp(lower[index], upper[index]);
+                (there[index], self.ln_p_of_alarms(space, &there))
+            });
+            let [(more, ln_more), (less, ln_less)] = ends;
+            if more > less && (ln_more != here || ln_less != here) {
+                local.gradient[index] -= (ln_more - ln_less) / (more - less);
+                let bend = (2.0 * here - ln_more - ln_less) / (0.5 * (more - less)).powi(2);
+                local.curvature[(index, index)] += bend.max(0.0);
+            }
+        }
+        local
     }
 
     /// ln of the level at which most detections are as strong as the stored laws have them.
@@ -207,6 +247,7 @@ pub(super) fn ln_likelihood(terms: &[Term]) -> f64 {
 pub(super) struct Sample {
     shots: Vec<Shot>,
     observations: Vec<Observation>,
+    alarms: Alarms,
     shared: SharedSpeckle,
     traced: PredictionCache,
     /// Shots of the scan per shot of the sample.
@@ -221,12 +262,13 @@ impl Sample {
         let observations = problem.observations.iter().step_by(every).copied().collect();
         let weight = problem.shots.len() as f64 / shots.len().max(1) as f64;
         let (shared, traced) = (problem.shared.step_by(every), PredictionCache::default());
-        Sample { shots, observations, shared, traced, weight }
+        let alarms = problem.alarms.beside_sample(every);
+        Sample { shots, observations, alarms, shared, traced, weight }
     }
 
     /// The problem of the sample alone.
     pub fn problem<'a>(&'a self, whole: &Problem<'a>) -> Problem<'a> {
-        let Sample { shots, observations, shared, traced, .. } = self;
-        Problem { shots, observations, shared, traced, ..*whole }
+        let Sample { shots, observations, alarms, shared, traced, .. } = self;
+        Problem { shots, observations, alarms, shared, traced, ..*whole }
     }
 }

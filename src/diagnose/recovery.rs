@@ -4,6 +4,7 @@
 
 use nalgebra::DVector;
 
+use super::alarms::NONE;
 use super::folds::Folds;
 use super::observation::{Observation, ReceiverLimits};
 use super::problem::Problem;
@@ -162,7 +163,8 @@ impl Bench<'_> {
         let with = bare.with(self.effect);
         let truth = self.scorer.problem.predict(&with, at);
         let observations = &self.simulate(&truth);
-        let problem = Problem { observations, ..self.scorer.problem };
+        // Chirps beside the target are not simulated.
+        let problem = Problem { observations, alarms: &NONE, ..self.scorer.problem };
         let before = problem.fit(bare, &fit.at, &[], &SCOUT);
         let after = problem.fit(&with, at, &[], &SCOUT);
         // The scan has more shots than the sample.

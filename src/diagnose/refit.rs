@@ -99,7 +99,7 @@ impl Problem<'_> {
     ) -> Local {
         let terms = self.terms(space, at);
         let slopes = self.slopes_over(step, space, at, bounds, &terms);
-        local(&terms, &slopes, |_| true).merge(space.prior(at))
+        local(&terms, &slopes, |_| true).merge(self.local_beside(space, at, bounds))
     }
 
     /// Points from which the laws are searched beside their stored values: for each law, up to `count` that fit best
@@ -148,13 +148,14 @@ impl Problem<'_> {
         let slopes = self.slopes(space, at, [&lower, &upper], &terms);
         (0..folds.folds).map(move |fold| {
             let local = local(&terms, &slopes, |shot| !folds.holds_out(fold, shot));
-            let local = local.merge(space.prior(at));
+            let local = local.merge(self.local_beside(space, at, [&lower, &upper]));
             let mut there = SEARCH.newton(at, [&lower, &upper], &local);
             // A step past the maximum is shortened.
-            let here = ln_likelihood_without(&terms, folds, fold) - space.prior(at).value;
+            let here = ln_likelihood_without(&terms, folds, fold) + self.beside(space, at);
             for _ in 0..HALVINGS {
                 let terms = self.terms(space, &there);
-                if ln_likelihood_without(&terms, folds, fold) - space.prior(&there).value >= here {
+                let beside = self.beside(space, &there);
+                if ln_likelihood_without(&terms, folds, fold) + beside >= here {
                     return there;
                 }
                 there = 0.5 * (there + at);
@@ -205,13 +206,13 @@ impl Problem<'_> {
             let [power_a, power_b] = [a, b].map(|slope| slope.ln_p - slope.ln_range);
             power_a * power_b / term.weight + a.ln_range * b.ln_range
         };
-        let prior = space.prior(at);
+        let beside = self.local_beside(space, at, [&lower, &upper]);
         let mut products: DMatrix<f64> = DMatrix::zeros(free.len(), free.len());
         for (row, &i) in free.iter().enumerate() {
             for (column, &j) in free.iter().enumerate() {
                 let pairs = slopes[i].iter().zip(&slopes[j]);
                 let known: f64 = terms.iter().zip(pairs).map(product).sum();
-                products[(row, column)] = known + prior.curvature[(i, j)];
+                products[(row, column)] = known + beside.curvature[(i, j)];
             }
         }
         let mut sd = vec![f64::INFINITY; at.len()];

@@ -36,6 +36,12 @@ pub(super) fn find_unexplained(scorer: &Scorer, remainder: &Remainder) -> Vec<Re
     if scorer.is_shared(&neighbours, largest_db) {
         found.push(neighbours);
     }
+    let Problem { alarms, .. } = scorer.problem;
+    if let Some([strength_db, gain]) = alarms.unlike(&prediction.receiver, declared) {
+        let p_value = (-gain).exp();
+        let covariate = "false alarms".to_owned();
+        found.push(ResidualStructure { covariate, strength_db, p_value });
+    }
     found.extend(residual::outliers(z, prediction, declared, observations, off_target));
     found.extend(residual::steps(observations));
     found.extend(residual::skewness(z, shared, speckle_sd_db(prediction.receiver.looks)));

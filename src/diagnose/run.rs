@@ -18,7 +18,7 @@ use super::shared::ALONE;
 use super::space::Space;
 use super::subject::Subject;
 use super::trial::Search;
-use crate::effects::{Effect, PredictionCache};
+use crate::effects::{Effect, PredictionCache, family};
 
 /// Multiple of the noise floor beyond which the target is another one: structure that no effect explains leaves less
 /// than two.
@@ -46,13 +46,14 @@ impl Diagnosis {
         notify: &(dyn Fn(&str) + Sync),
     ) -> Result<Report, DiagnoseError> {
         let Subject { stage, laws, at_work, receiver, declared, .. } = *subject;
-        let Subject { shots, observations, .. } = *subject;
+        let Subject { shots, observations, alarms, .. } = *subject;
         let (block_m, folds, seed) = (self.block_m, self.folds, self.seed);
         let independent = &Folds::new(shots, block_m, folds, seed);
         subject.check(independent)?;
         let traced = &PredictionCache::default();
         let shared = &ALONE;
-        let alone = Problem { stage, shots, observations, declared, receiver, shared, traced };
+        let alone =
+            Problem { stage, shots, observations, alarms, declared, receiver, shared, traced };
         let scorer = Scorer { problem: alone, folds: independent, settings: self };
 
         notify("refitting the scattering models");
@@ -68,13 +69,16 @@ impl Diagnosis {
         let base = if shared.is_any() { scorer.again(&base) } else { base };
         let search = Search { scorer, sample, notify };
 
-        let choice = choose_effects(&search, base, effects);
+        let members: Vec<&dyn Effect> = effects.iter().flat_map(|effect| family(*effect)).collect();
+        let choice = choose_effects(&search, base, &members);
         let base = &choice.base;
         let off_target = detections_off_target(&scorer, subject, &choice.model.state)?;
         refuse_a_poor_fit(&scorer.errors(&choice.model.state.held_out))?;
 
         notify("controls");
-        let controls = controls(&search, base, effects, numbers_of_controls(&choice.ranking));
+        let simplest = effects.iter().filter_map(|effect| family(*effect).into_iter().next());
+        let simplest: Vec<&dyn Effect> = simplest.collect();
+        let controls = controls(&search, base, &simplest, numbers_of_controls(&choice.ranking));
 
         notify("testing the remainder");
         Ok(report(subject, &scorer, &choice, off_target, controls))

@@ -60,8 +60,9 @@ impl MeasuredScene<'_> {
         let shots = trace_shots(&stage)?;
         stage.middle = middle(&shots);
         // The cloud against the chirps.
-        let matched = match_cloud(cloud, &scene.chirps, &shots)?;
         let (receiver, declared) = declared_receiver(radar);
+        let mut matched = match_cloud(cloud, &scene.chirps, &shots, declared.threshold_w)?;
+        matched.alarms.cells = radar.gate_cells();
         let subject = Subject {
             stage: &stage,
             laws,
@@ -71,6 +72,7 @@ impl MeasuredScene<'_> {
             shots: &shots,
             observations: &matched.observations,
             strays: &matched.strays,
+            alarms: &matched.alarms,
             pose: &poses(scene),
         };
         Diagnosis { seed, ..Diagnosis::for_spot(radar.spot_fwhm_m()) }

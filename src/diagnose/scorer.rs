@@ -44,8 +44,18 @@ pub(super) struct Scorer<'p> {
 pub(super) struct State<'a> {
     pub space: Space<'a>,
     pub fit: Fit,
+    /// Scores by fits without each fold.
+    pub held_out: HeldOut,
+}
+
+/// What a model says of data that took no part in its fit.
+#[derive(Clone, Default)]
+pub(super) struct HeldOut {
     /// Score of every shot by a fit without its fold.
-    pub held_out: Vec<Score>,
+    pub shots: Vec<Score>,
+    /// ln p of the chirps that see no target. They take part in every fit, of one number that any four fifths of them
+    /// tell as well.
+    pub alarms: f64,
 }
 
 impl Scorer<'_> {
@@ -104,7 +114,7 @@ impl Scorer<'_> {
         before: &State,
         space: Space<'a>,
         mut fit: Fit,
-        mut held_out: Vec<Score>,
+        mut held_out: HeldOut,
     ) -> State<'a> {
         if !before.space.costly(&before.fit.at).is_empty() {
             fit = self.problem.fit(&space, &fit.at, &[], &SCOUT);
@@ -127,12 +137,12 @@ impl Scorer<'_> {
     }
 
     /// Score of every shot by a fit without its fold.
-    pub fn held_out(&self, space: &Space, at: &DVector<f64>) -> Vec<Score> {
+    pub fn held_out(&self, space: &Space, at: &DVector<f64>) -> HeldOut {
         self.held_out_with(space, at, &[])
     }
 
     /// Held-out scores with factors on the means, given by their logarithms.
-    pub fn held_out_with(&self, space: &Space, at: &DVector<f64>, ln_factor: &[f64]) -> Vec<Score> {
+    pub fn held_out_with(&self, space: &Space, at: &DVector<f64>, ln_factor: &[f64]) -> HeldOut {
         let mut all: Vec<(usize, Score)> = Vec::new();
         for (fold, at) in self.problem.fit_without(space, at, self.folds).enumerate() {
             let prediction = scaled(self.problem.predict(space, &at), ln_factor);
@@ -140,22 +150,26 @@ impl Scorer<'_> {
             all.extend(scores(&self.problem, &prediction, is_held_out));
         }
         all.sort_by_key(|(shot, _)| *shot);
-        all.into_iter().map(|(_, score)| score).collect()
+        let shots = all.into_iter().map(|(_, score)| score).collect();
+        HeldOut { shots, alarms: self.problem.ln_p_of_alarms(space, at) }
     }
 
-    /// Difference in ln p of all shots, and its standard error.
-    pub fn difference(&self, a: &[Score], b: &[Score]) -> [f64; 2] {
-        let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a.ln_p - b.ln_p).collect();
-        self.folds.sum(&differences)
+    /// Difference in ln p, and its standard error. A gain of g by one number has that of √2g.
+    pub fn difference(&self, a: &HeldOut, b: &HeldOut) -> [f64; 2] {
+        let pairs = a.shots.iter().zip(&b.shots);
+        let differences: Vec<f64> = pairs.map(|(a, b)| a.ln_p - b.ln_p).collect();
+        let [sum, se] = self.folds.sum(&differences);
+        let of_alarms = a.alarms - b.alarms;
+        [sum + of_alarms, se.hypot((2.0 * of_alarms.abs()).sqrt())]
     }
 
     /// Errors of held-out scores.
-    pub fn errors(&self, held_out: &[Score]) -> Errors {
-        errors(held_out, self.folds)
+    pub fn errors(&self, held_out: &HeldOut) -> Errors {
+        errors(&held_out.shots, self.folds)
     }
 
     /// Whether held-out errors grow by more than their standard error.
-    pub fn is_farther_off(&self, now: &[Score], before: &[Score]) -> bool {
+    pub fn is_farther_off(&self, now: &HeldOut, before: &HeldOut) -> bool {
         let [now, before] = [now, before].map(|scores| self.errors(scores));
         now.rmse_db > before.rmse_db + now.rmse_se_db
     }

@@ -24,6 +24,7 @@ pub(super) struct Screen<'a> {
     pub problem: Problem<'a>,
     terms: Vec<Term>,
     ln_likelihood: f64,
+    ln_p_of_alarms: f64,
     slopes: Vec<Vec<Slope>>,
     /// Information on the model's own unknowns.
     absorbs: Option<Cholesky<f64, Dyn>>,
@@ -64,13 +65,24 @@ impl<'a> Screen<'a> {
         let own: DVector<f64> = DVector::from_iterator(slopes.len(), pulls);
         let own_step = absorbs.as_ref().map_or(DVector::zeros(slopes.len()), |c| c.solve(&own));
         let ln_likelihood = problem.ln_likelihood(space, at);
-        Screen { problem, terms, ln_likelihood, slopes, absorbs, own_step, leaves_laws_open }
+        let ln_p_of_alarms = problem.ln_p_of_alarms(space, at);
+        Screen {
+            problem,
+            terms,
+            ln_likelihood,
+            ln_p_of_alarms,
+            slopes,
+            absorbs,
+            own_step,
+            leaves_laws_open,
+        }
     }
 
     /// Gain in ln likelihood that a start promises.
     pub fn promise(&self, space: &Space, at: &DVector<f64>) -> f64 {
         let there = self.problem.terms(space, at);
-        let gain = ln_likelihood(&there) - ln_likelihood(&self.terms);
+        let alarms = self.problem.ln_p_of_alarms(space, at) - self.ln_p_of_alarms;
+        let gain = ln_likelihood(&there) - ln_likelihood(&self.terms) + alarms;
         let changes = changes(&self.terms, &there);
         let [score, information] = [self.score(&changes), self.information(&changes)];
         let is_useful = score > 0.0 && information > 0.0;

@@ -293,6 +293,15 @@ impl<'a> Space<'a> {
         Model { laws, receiver, effects, level }
     }
 
+    /// The receiver at a point.
+    pub fn received(&self, receiver: Receiver, at: &DVector<f64>) -> Receiver {
+        let found = self.effects.iter().copied().zip(self.effect_values(at));
+        let declared = self.declared.iter().cloned();
+        declared
+            .chain(found)
+            .fold(receiver, |receiver, (effect, values)| effect.receive(&values, receiver))
+    }
+
     /// Least and largest value of every unknown.
     pub fn bounds(&self) -> [DVector<f64>; 2] {
         let (mut lower, mut upper) = (Vec::new(), Vec::new());

@@ -1,5 +1,6 @@
 //! What a diagnosis starts from, and whether it is enough.
 
+use super::alarms::Alarms;
 use super::error::DiagnoseError;
 use super::folds::Folds;
 use super::matching::Stray;
@@ -33,8 +34,10 @@ pub struct Subject<'a> {
     pub shots: &'a [Shot],
     /// The observation of each shot.
     pub observations: &'a [Observation],
-    /// Detections that belong to no shot.
+    /// Detections that belong to no shot and are no false alarms.
     pub strays: &'a [Stray],
+    /// What the chirps report that see no target.
+    pub alarms: &'a Alarms,
     /// Poses of the meshes, for the report.
     pub pose: &'a [MeshPose],
 }

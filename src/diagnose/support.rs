@@ -4,8 +4,7 @@ use std::cell::OnceCell;
 
 use super::evidence::{Candidate, Largest};
 use super::field::Structure;
-use super::score::Score;
-use super::scorer::{Scorer, State};
+use super::scorer::{HeldOut, Scorer, State};
 use super::screen::Screen;
 use super::settings::Diagnosis;
 use super::size::Size;
@@ -81,7 +80,7 @@ impl<'j, 'p, 'a> Judge<'j, 'p, 'a> {
     }
 
     /// Held-out scores of a trial and the gain that counts; `None` where it is not supported.
-    pub fn support(&self, trial: &mut Trial) -> Option<(Vec<Score>, f64)> {
+    pub fn support(&self, trial: &mut Trial) -> Option<(HeldOut, f64)> {
         let Candidate { gain, numbers, .. } = trial.candidate;
         let (settings, shots) = (self.scorer.settings, self.scorer.problem.independent_shots());
         let is_spread = trial.size.is_spread();

@@ -22,6 +22,9 @@ const SEEDS: u64 = 12;
 const RANGE_SD_M: f64 = 1e-3;
 
 /// The paper's mixture with S and R that backscatter sees.
+/// −77 dBm.
+const THRESHOLD_W: f64 = 2e-11;
+
 fn law() -> Brdf {
     let specular = CookTorrance {
         f_lambda: 0.055,
@@ -190,6 +193,7 @@ fn diagnosed_of(
         shots,
         observations,
         strays: &[],
+        alarms: &Alarms::default(),
         pose: &[],
     };
     let started = std::time::Instant::now();
@@ -362,6 +366,7 @@ fn a_scan_with_too_little_says_so() {
         shots: &shots,
         observations: &observations,
         strays: &[],
+        alarms: &Alarms::default(),
         pose: &[],
     };
     let refused = |powers_w: &dyn Fn(usize) -> f64| {
@@ -401,7 +406,7 @@ fn a_cloud_finds_its_shots() {
     let numbered = Cloud::new(points.clone()).unwrap();
     points.push(point(&shots[9], missed, 0.0));
     let cloud = Cloud::new(points.clone()).unwrap();
-    let found = match_cloud(&cloud, chirps, &shots).unwrap();
+    let found = match_cloud(&cloud, chirps, &shots, THRESHOLD_W).unwrap();
     let [behind, beside] = &found.strays[..] else { panic!("{:?}", found.strays) };
     assert_eq!(behind.shot, Some(shots[8]));
     assert!((behind.range_m - shots[8].hit.range_m - 0.5).abs() < 1e-9);
@@ -411,7 +416,7 @@ fn a_cloud_finds_its_shots() {
     points.pop();
     points.iter_mut().for_each(|point| point.chirp = None);
     let cloud = Cloud::new(points.clone()).unwrap();
-    let by_direction = match_cloud(&cloud, chirps, &shots).unwrap();
+    let by_direction = match_cloud(&cloud, chirps, &shots, THRESHOLD_W).unwrap();
     assert_eq!(by_direction.observations, found.observations);
     // Points with the numbers of other chirps are refused.
     for off in [1, -1] {
@@ -419,7 +424,7 @@ fn a_cloud_finds_its_shots() {
         for point in &mut points {
             point.chirp = point.chirp.and_then(|chirp| chirp.checked_add_signed(off));
         }
-        let refused = match_cloud(&Cloud::new(points).unwrap(), chirps, &shots);
+        let refused = match_cloud(&Cloud::new(points).unwrap(), chirps, &shots, THRESHOLD_W);
         let Err(DiagnoseError::Misnumbered { off: found }) = refused else { panic!("{refused:?}") };
         assert_eq!(found, i64::from(off));
     }
@@ -438,12 +443,12 @@ fn a_cloud_finds_its_shots() {
             .iter()
             .map(|point| CloudPoint { chirp: point.chirp.map(|chirp| chirp + first), ..*point });
         let cloud = Cloud::new(of_pass.collect()).unwrap();
-        let found = match_cloud(&cloud, &passes, &shots_twice).unwrap();
+        let found = match_cloud(&cloud, &passes, &shots_twice, THRESHOLD_W).unwrap();
         assert_eq!(found.observations.iter().filter(|o| o.power_w.is_some()).count(), 8);
     }
     // Row numbers in place of chirp numbers are refused.
     let given = |points: Vec<CloudPoint>| {
-        match_cloud(&Cloud::new(points).unwrap(), chirps, &shots).unwrap_err()
+        match_cloud(&Cloud::new(points).unwrap(), chirps, &shots, THRESHOLD_W).unwrap_err()
     };
     let on_target = &numbered.points()[..8];
     let rows =
@@ -466,7 +471,7 @@ fn a_cloud_finds_its_shots() {
     assert!(matches!(twice, DiagnoseError::Repeated { second: 8, points: 16 }), "{twice}");
     // A cloud of something else is refused.
     points.iter_mut().for_each(|p| p.point = Point::from(p.point.xyz + DVec3::new(0.0, 0.0, 3.0)));
-    let elsewhere = match_cloud(&Cloud::new(points).unwrap(), chirps, &shots);
+    let elsewhere = match_cloud(&Cloud::new(points).unwrap(), chirps, &shots, THRESHOLD_W);
     assert!(matches!(elsewhere, Err(DiagnoseError::Elsewhere { matched: 0, points: 9 })));
     assert!((found.observations[20].power_w.unwrap() - 1e-9).abs() < 1e-20);
     assert!((found.observations[20].range_m.unwrap() - shots[20].hit.range_m - 1e-3).abs() < 1e-9);
@@ -497,7 +502,7 @@ fn a_wide_spot_sees_past_the_edge() {
         Cloud::new(chirps.number.iter().zip(&chirps.rays).filter_map(point).collect()).unwrap()
     };
     let seen = cloud(0.0);
-    let found = match_cloud(&seen, chirps, &shots).unwrap();
+    let found = match_cloud(&seen, chirps, &shots, THRESHOLD_W).unwrap();
     assert!(found.strays.len() * 3 > seen.points().len(), "{}", found.strays.len());
     // Twice as often, and half a metre behind, they are not of it.
     let stray = |point: &&CloudPoint| shots.iter().all(|shot| Some(shot.chirp) != point.chirp);
@@ -505,8 +510,8 @@ fn a_wide_spot_sees_past_the_edge() {
     let mut twice = [seen.points(), &strays, &strays].concat();
     twice.iter_mut().for_each(|point| point.chirp = None);
     let twice = Cloud::new(twice).unwrap();
-    let twice = match_cloud(&twice, chirps, &shots).unwrap_err();
+    let twice = match_cloud(&twice, chirps, &shots, THRESHOLD_W).unwrap_err();
     assert!(matches!(twice, DiagnoseError::Repeated { .. }), "{twice}");
-    let behind = match_cloud(&cloud(0.5), chirps, &shots).unwrap_err();
+    let behind = match_cloud(&cloud(0.5), chirps, &shots, THRESHOLD_W).unwrap_err();
     assert!(matches!(behind, DiagnoseError::Elsewhere { matched: 0, .. }), "{behind}");
 }

@@ -32,7 +32,7 @@ const SHARE_OF_START: f64 = 0.7;
 const SHARE_OF_WORD: f64 = 0.3;
 /// An effect that promises less than this share of the best is not fitted.
 const SHARE_TO_SCOUT: f64 = 0.05;
-/// Effects of each round that are fitted to all shots and predict held-out patches.
+/// Effects of each round, with all members of their families, that are fitted to all shots and predict held-out patches.
 const SHORTLIST: usize = 5;
 /// An effect that gains less than this share of the best is not among them.
 const SHARE_OF_BEST: f64 = 0.3;
@@ -136,16 +136,21 @@ impl<'p> Search<'p> {
     /// all shots do not.
     fn refit_shortlist(&self, state: &State, trials: &mut [Trial], round: usize, hopeless: f64) {
         let mut best = 0.5 * self.scorer.settings.least_gain_of(1, 1) / SHARE_OF_BEST;
-        let mut kept = 0;
+        let mut kept: Vec<&str> = Vec::new();
         for trial in trials {
             let promised = trial.candidate.gain;
-            if kept == SHORTLIST || promised < hopeless.max(SHARE_OF_BEST * best) {
+            let is_full = kept.len() == SHORTLIST && !kept.contains(&trial.candidate.name);
+            if is_full || promised < hopeless.max(SHARE_OF_BEST * best) {
                 break;
             }
             (self.notify)(&format!("round {round}: refitting with {}", trial.effect.name()));
             self.refit(state, trial);
             best = best.max(trial.candidate.gain);
-            kept += usize::from(trial.candidate.gain >= SHARE_OF_PROMISE * promised);
+            if trial.candidate.gain >= SHARE_OF_PROMISE * promised
+                && !kept.contains(&trial.candidate.name)
+            {
+                kept.push(trial.candidate.name);
+            }
         }
     }
 

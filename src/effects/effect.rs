@@ -46,6 +46,13 @@ pub trait Effect: Sync {
         None
     }
 
+    /// The members of its family: sets of its parameters, by their positions and in their order, of which a search tries each
+    /// while the others stay absent; the simplest first. It reports the simplest that predicts as well as the best.
+    /// Empty for an effect of one form.
+    fn members(&self) -> &'static [&'static [usize]] {
+        &[]
+    }
+
     /// Values from which a search starts, with a weak effect. There are several if one start could miss the optimum,
     /// such as places over the target.
     fn starts(&self, stage: &Stage, shots: &[Shot]) -> Vec<Vec<f64>>;

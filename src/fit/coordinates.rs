@@ -303,8 +303,10 @@ fn narrow(list: &mut [Coordinate], name: &str, [min, max]: [f64; 2]) -> Result<(
     Ok(())
 }
 
-/// Sets k, f_λ and r_s from S and R: k as near to the gauge's as f_λ ≤ 1 and r_s ≤ 1 allow.
-fn set_levels(model: &mut Brdf, k: f64, [s, r]: [f64; 2]) {
+/// Sets k, f_λ and r_s from S and R: k as near to the gauge's as f_λ ≤ 1 and r_s ≤ 1 allow. Levels that no k allows,
+/// S + R > 1, are lowered together.
+fn set_levels(model: &mut Brdf, k: f64, levels: [f64; 2]) {
+    let [s, r] = levels.map(|level| level / (levels[0] + levels[1]).max(1.0));
     let k = if r <= 1.0 - s { k.clamp(r, 1.0 - s) } else { r / (r + s) };
     model.set_parameter("k", k);
     model.set_parameter("specular.f_lambda", s / (1.0 - k));

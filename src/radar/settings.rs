@@ -238,6 +238,13 @@ impl Radar {
         self.noise.map_or(0.0, |noise| noise.level_w(threshold_w, cell_m, looks))
     }
 
+    /// Range cells of the gate, where `[radar.noise]` states its cells or its length.
+    pub fn gate_cells(&self) -> Option<f64> {
+        let noise = self.noise?;
+        let by_length = noise.gate_length_m.map(|m| m / self.chirp().range_resolution_m());
+        noise.gate_cells.or(by_length)
+    }
+
     /// The form of its speckle, for a scan that several antennas see or not, with several paths per chirp or not.
     pub fn speckle_form(&self, several_antennas: bool, several_paths: bool) -> SpeckleForm {
         let has_beats = self.receiver.is_some() && several_paths;

@@ -158,6 +158,10 @@ pub(super) fn covariate(name: &str) -> (String, &'static str) {
         }
         "outlying powers" => ("powers far from any law", "Silhouettes, or echoes of other things."),
         "outlying ranges" => ("ranges far off", "Silhouettes, echoes of other things, or detours."),
+        "false alarms" => (
+            "detections beside the target",
+            "The receiver's noise is another one than declared, or something else is in its gate.",
+        ),
         "stray detections" => ("detections off the target", "False alarms, or a mesh that is cut."),
         "form of the scatter" => {
             ("form of the scatter", "The fluctuation follows another law than speckle.")

@@ -1,6 +1,7 @@
 //! A layer over part of the target, such as clothing: −loss/cos θ dB beyond a line across the field of
-//! view, which is a plane through the radar.
+//! view, which is a plane through the radar, or within an oval outline, a cone from the radar.
 
+use super::foreign_patch::cells_with_shots;
 use crate::effects::effect::{About, Effect, EffectParameter, Level};
 use crate::effects::place::{Place, along_m};
 use crate::effects::shot::{Shot, Stage};
@@ -8,8 +9,33 @@ use crate::units::ratio_from_db;
 
 pub(crate) struct CoveringLayer;
 
+/// Sides of the cells in which a search for an oval begins, m.
+const OVALS_M: [f64; 2] = [0.1, 0.2];
 /// Least cos θ: a flat layer seen edge-on is as deep as it is wide.
 const LEAST_COS_THETA: f64 = 0.02;
+
+const PARAMETERS: [EffectParameter; 8] = [
+    EffectParameter::new("loss_db", "dB", [0.0, 30.0], 0.0, 0.5),
+    EffectParameter::new("boundary_m", "m", [-3.0, 3.0], 0.0, 0.02),
+    EffectParameter::new("direction_deg", "deg", [-360.0, 360.0], 90.0, 5.0),
+    EffectParameter::new("centre_x_m", "m", [-3.0, 3.0], 0.0, 0.02),
+    EffectParameter::new("centre_y_m", "m", [-3.0, 3.0], 0.0, 0.02),
+    EffectParameter::new("length_m", "m", [0.01, OPEN_M], OPEN_M, 0.02),
+    EffectParameter::new("width_m", "m", [0.01, OPEN_M], OPEN_M, 0.02),
+    EffectParameter::new("turn_deg", "deg", [-360.0, 360.0], 0.0, 10.0),
+];
+
+/// Half axis of an outline that is none, m.
+const OPEN_M: f64 = 100.0;
+
+/// How far within an oval a place of the target plane lies, m: along the ray from its centre.
+fn within_m(shot: &Shot, [x_m, y_m]: [f64; 2], half_m: [f64; 2], turn_deg: f64) -> f64 {
+    let (sin, cos) = turn_deg.to_radians().sin_cos();
+    let [x, y] = [shot.xt_m - x_m, shot.yt_m - y_m];
+    let [along, across] = [x * cos + y * sin, y * cos - x * sin];
+    let share = (along / half_m[0]).hypot(across / half_m[1]);
+    if share > 1e-9 { along.hypot(across) * (1.0 / share - 1.0) } else { half_m[0].min(half_m[1]) }
+}
 
 /// Share of a Gaussian spot beyond an edge that its centre has passed by `beyond_m`; the normal
 /// integral by the logistic function, within 0.01.
@@ -23,16 +49,13 @@ const ABOUT: About = About {
     level: Level::Scene,
     description: "Part of the target is covered, as by clothing, which the wave crosses twice: a loss that \
          grows with the way through the layer, as 1/cos θ, on the far side of a straight line across \
-         the field of view. The line lies boundary_m from the field's centre, in a direction counted \
-         from x_t towards y_t, and the layer lies beyond it.",
-    signature: "The power drops at a line and stays low on one side, more so at large angles. A foreign \
-         patch has a closed outline and the same offset at all angles; a gain over the field and a \
+         the field of view, or within an oval. The line lies boundary_m from the field's centre, in a direction \
+         counted from x_t towards y_t, and the layer lies beyond it. An oval takes its place where length_m and width_m are \
+         given: half axes about its centre, the first turned from x_t towards y_t.",
+    signature: "The power drops at an edge and stays low behind it, more so at large angles. A foreign \
+         patch has the same offset at all angles; a gain over the field and a \
          drift change without an edge. A layer over everything cannot be told from the calibration.",
-    parameters: &[
-        EffectParameter::new("loss_db", "dB", [0.0, 30.0], 0.0, 0.5),
-        EffectParameter::new("boundary_m", "m", [-3.0, 3.0], 0.0, 0.02),
-        EffectParameter::new("direction_deg", "deg", [-360.0, 360.0], 90.0, 5.0),
-    ],
+    parameters: &PARAMETERS,
     conflicts: &[],
 };
 
@@ -41,7 +64,12 @@ impl Effect for CoveringLayer {
         &ABOUT
     }
 
-    /// Lines that cut off a third and two thirds of the shots, from four sides.
+    /// Beyond a line; and within an oval.
+    fn members(&self) -> &'static [&'static [usize]] {
+        &[&[0, 1, 2], &[0, 3, 4, 5, 6, 7]]
+    }
+
+    /// Lines that cut off a third and two thirds of the shots, from four sides, and ovals that lie on the target.
     fn starts(&self, _stage: &Stage, shots: &[Shot]) -> Vec<Vec<f64>> {
         let mut starts = Vec::new();
         for direction_deg in [0.0, 90.0, 180.0, 270.0] {
@@ -51,21 +79,41 @@ impl Effect for CoveringLayer {
             for share in [1.0 / 3.0, 2.0 / 3.0] {
                 let boundary_m = along_m.get((share * along_m.len() as f64) as usize).copied();
                 let boundary_m = boundary_m.unwrap_or(0.0).clamp(-3.0, 3.0);
-                starts.push(vec![1.0, boundary_m, direction_deg]);
+                starts.push(vec![1.0, boundary_m, direction_deg, 0.0, 0.0, OPEN_M, OPEN_M, 0.0]);
             }
         }
+        let ovals = cells_with_shots(shots, OVALS_M).into_iter().map(|([x_m, y_m], side_m)| {
+            let [x_m, y_m] = [x_m, y_m].map(|centre_m| centre_m.clamp(-3.0, 3.0));
+            vec![1.0, PARAMETERS[1].absent, 90.0, x_m, y_m, side_m, side_m, 0.0]
+        });
+        starts.extend(ovals);
         starts
     }
 
     fn place(&self, values: &[f64]) -> Option<Place> {
-        let &[_, off_m, direction_deg] = values else { return None };
+        let &[_, off_m, direction_deg, x_m, y_m, length_m, width_m, _] = values else {
+            return None;
+        };
+        if length_m.min(width_m) < OPEN_M {
+            return Some(Place::Round { x_m, y_m, radius_m: length_m.max(width_m) });
+        }
         Some(Place::Beyond { off_m, direction_deg })
     }
 
     fn gain(&self, values: &[f64], stage: &Stage, shot: &Shot) -> f64 {
-        let &[loss_db, boundary_m, direction_deg] = values else { return 1.0 };
+        let &[loss_db, boundary_m, direction_deg, x_m, y_m, length_m, width_m, turn_deg] = values
+        else {
+            return 1.0;
+        };
+        if loss_db == 0.0 {
+            return 1.0;
+        }
         let left = ratio_from_db(-loss_db / shot.hit.cos_theta.max(LEAST_COS_THETA));
-        let beyond_m = along_m(shot, direction_deg) - boundary_m;
+        let beyond_m = if length_m.min(width_m) < OPEN_M {
+            within_m(shot, [x_m, y_m], [length_m, width_m], turn_deg)
+        } else {
+            along_m(shot, direction_deg) - boundary_m
+        };
         let section = stage.beam(shot).section(shot.hit.range_m);
         1.0 - (1.0 - left) * share_of_spot(beyond_m, section.two_way_fwhm_m())
     }
@@ -80,7 +128,29 @@ mod tests {
         let bench = Bench::plate();
         let mut shot = Shot { yt_m, ..bench.shots[0] };
         shot.hit.cos_theta = theta_deg.to_radians().cos();
-        db(CoveringLayer.gain(&[1.5, 0.1, 90.0], &bench.stage(), &shot))
+        let line = [1.5, 0.1, 90.0, 0.0, 0.0, OPEN_M, OPEN_M, 0.0];
+        db(CoveringLayer.gain(&line, &bench.stage(), &shot))
+    }
+
+    #[test]
+    fn an_oval_covers_what_lies_within_it() {
+        let bench = Bench::plate();
+        let gain_db = |xt_m: f64, yt_m: f64| {
+            let shot = Shot { xt_m, yt_m, ..bench.shots[0] };
+            // 0.4 m along the diagonal, 0.1 m across it.
+            let oval = [2.0, 0.0, 90.0, 0.1, 0.2, 0.4, 0.1, 45.0];
+            let there = CoveringLayer.gain(&oval, &bench.stage(), &shot);
+            db(there) * shot.hit.cos_theta
+        };
+        for (xt_m, yt_m, expected_db) in
+            [(0.1, 0.2, -2.0), (0.33, 0.43, -2.0), (0.22, 0.08, 0.0), (0.43, 0.53, 0.0)]
+        {
+            let found = gain_db(xt_m, yt_m);
+            assert!((found - expected_db).abs() < 1e-3, "{xt_m} {yt_m}: {found}");
+        }
+        // On the outline half of a spot is covered.
+        let half = 0.1 + 0.4 / 2f64.sqrt();
+        assert!((gain_db(half, half + 0.1) + 0.89).abs() < 0.05, "{}", gain_db(half, half + 0.1));
     }
 
     #[test]

@@ -395,7 +395,8 @@ mod tests {
     fn finely_w(bench: &Bench, shot: &Shot, diameter_m: f64) -> f64 {
         const HALF: i32 = 40;
         let (stage, law) = (bench.stage(), paint(lobe()));
-        let model = Model { laws: vec![law], receiver: Receiver::LINEAR, effects: Vec::new(), level: 1.0 };
+        let model =
+            Model { laws: vec![law], receiver: Receiver::LINEAR, effects: Vec::new(), level: 1.0 };
         let section = stage.beam(shot).section(shot.hit.range_m);
         let (u, v) = shot.ray.direction.xyz().any_orthonormal_pair();
         let sd_m = diameter_m / (16.0 * std::f64::consts::LN_2).sqrt();

@@ -10,12 +10,15 @@ use crate::units::ratio_from_db;
 
 pub(crate) struct ForeignPatch;
 
-const PARAMETERS: [EffectParameter; 5] = [
+const PARAMETERS: [EffectParameter; 8] = [
     EffectParameter::new("level_db", "dB", [-30.0, 30.0], 0.0, 0.5),
     EffectParameter::new("centre_x_m", "m", [-3.0, 3.0], 0.0, 0.01),
     EffectParameter::new("centre_y_m", "m", [-3.0, 3.0], 0.0, 0.01),
     EffectParameter::new("radius_m", "m", [0.005, 1.0], 0.05, 0.01),
     EffectParameter::new("fade_m", "m", [0.0, 0.1], 0.016, 0.004),
+    EffectParameter::new("tilted_db", "dB", [-30.0, 30.0], 0.0, 1.0),
+    EffectParameter::new("oval", "1", [-0.6, 0.6], 0.0, 0.1),
+    EffectParameter::new("slant", "1", [-0.6, 0.6], 0.0, 0.1),
 ];
 
 /// Sides of the cells where a search begins, m, and most of them along an edge of the target.
@@ -47,6 +50,25 @@ fn apart_m(stage: &Stage, shot: &Shot, [x_m, y_m]: [f64; 2], far_m: f64) -> f64 
     (shot.target.inverse() * shot.hit.point).xyz.distance(centre)
 }
 
+/// The middles of the cells of each of some sides, m, that hold a shot, with the side.
+pub(super) fn cells_with_shots(shots: &[Shot], sides_m: [f64; 2]) -> Vec<([f64; 2], f64)> {
+    let [left, right] = span(shots.iter().map(|shot| shot.xt_m));
+    let [low, high] = span(shots.iter().map(|shot| shot.yt_m));
+    let mut found = Vec::new();
+    for side_m in sides_m {
+        let (columns, rows) = (cells(right - left, side_m), cells(high - low, side_m));
+        let (width, height) = ((right - left) / columns as f64, (high - low) / rows as f64);
+        for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |c| (row, c))) {
+            let [x, y] = [left + (column as f64 + 0.5) * width, low + (row as f64 + 0.5) * height];
+            let reach_m = (0.5 * side_m).clamp(0.02, 0.3);
+            if shots.iter().any(|l| (l.xt_m - x).hypot(l.yt_m - y) < reach_m) {
+                found.push(([x, y], side_m));
+            }
+        }
+    }
+    found
+}
+
 /// Number of cells of a side along a length, both in m.
 fn cells(length_m: f64, side_m: f64) -> usize {
     ((length_m / side_m).ceil() as usize).clamp(1, MOST_CELLS)
@@ -61,11 +83,13 @@ fn span(values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
 const ABOUT: About = About {
     name: "foreign-patch",
     level: Level::Scene,
-    description: "A round place on the target is of another material and returns level_db more than the rest. \
+    description: "A place on the target is of another material and returns level_db more than the rest, and \
+         tilted_db·sin²θ more where it is met at an angle. \
          Its centre is on the surface at the given x_t and y_t of the field of view. The radius is the straight \
-         distance from the centre. Its edge is as soft as one seen by a spot of the diameter fade_m.",
-    signature: "The residual has one compact spot on the surface, at any angle, with a sharp outline. A \
-         covering layer ends at a straight line and its loss grows with the angle; multiple bounces \
+         distance from the centre. It grows by the factor exp(oval·cos 2φ + slant·sin 2φ) in the direction φ of the field of \
+         view, counted from x_t towards y_t. Its edge is as soft as one seen by a spot of the diameter fade_m.",
+    signature: "The residual has one compact spot on the surface with a sharp outline. The loss of a \
+         covering layer grows as 1/cos θ; multiple bounces \
          brighten places too, but concave ones, and with longer ranges.",
     parameters: &PARAMETERS,
     conflicts: &[],
@@ -78,36 +102,36 @@ impl Effect for ForeignPatch {
 
     /// The cells of two grids over the target that hold a shot, brighter and darker.
     fn starts(&self, _stage: &Stage, shots: &[Shot]) -> Vec<Vec<f64>> {
-        let [left, right] = span(shots.iter().map(|shot| shot.xt_m));
-        let [low, high] = span(shots.iter().map(|shot| shot.yt_m));
         let mut starts = Vec::new();
-        for side_m in SIDES_M {
-            let (columns, rows) = (cells(right - left, side_m), cells(high - low, side_m));
-            let (width, height) = ((right - left) / columns as f64, (high - low) / rows as f64);
-            for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |c| (row, c))) {
-                let [x, y] =
-                    [left + (column as f64 + 0.5) * width, low + (row as f64 + 0.5) * height];
-                let radius_m = (0.5 * side_m).clamp(0.02, 0.3);
-                if shots.iter().any(|l| (l.xt_m - x).hypot(l.yt_m - y) < radius_m) {
-                    let [x, y] = [x, y].map(|centre_m| centre_m.clamp(-3.0, 3.0));
-                    let fade_m = PARAMETERS[4].absent;
-                    starts.extend(LEVELS_DB.map(|db| vec![db, x, y, radius_m, fade_m]));
-                }
-            }
+        for (middle_m, side_m) in cells_with_shots(shots, SIDES_M) {
+            let [x, y] = middle_m.map(|centre_m| centre_m.clamp(-3.0, 3.0));
+            let (radius_m, fade_m) = ((0.5 * side_m).clamp(0.02, 0.3), PARAMETERS[4].absent);
+            starts.extend(LEVELS_DB.map(|db| vec![db, x, y, radius_m, fade_m, 0.0, 0.0, 0.0]));
         }
         starts
     }
 
+    /// Round with one level; and oval with a level that changes with the angle.
+    fn members(&self) -> &'static [&'static [usize]] {
+        &[&[0, 1, 2, 3, 4], &[0, 1, 2, 3, 4, 5, 6, 7]]
+    }
+
     fn place(&self, values: &[f64]) -> Option<Place> {
-        let &[_, x_m, y_m, radius_m, _] = values else { return None };
+        let &[_, x_m, y_m, radius_m, ..] = values else { return None };
         Some(Place::Round { x_m, y_m, radius_m })
     }
 
     fn gain(&self, values: &[f64], stage: &Stage, shot: &Shot) -> f64 {
-        let &[level_db, x_m, y_m, radius_m, fade_m] = values else { return 1.0 };
+        let &[level_db, x_m, y_m, radius_m, fade_m, tilted_db, oval, slant] = values else {
+            return 1.0;
+        };
+        let level_db = level_db + tilted_db * (1.0 - shot.hit.cos_theta.powi(2));
         if level_db == 0.0 {
             return 1.0;
         }
+        let azimuth_rad = (shot.yt_m - y_m).atan2(shot.xt_m - x_m);
+        let (sin, cos) = (2.0 * azimuth_rad).sin_cos();
+        let radius_m = radius_m * (oval * cos + slant * sin).exp();
         let apart_m = apart_m(stage, shot, [x_m, y_m], radius_m + FADED * fade_m);
         let share = share_of_spot(radius_m - apart_m, fade_m);
         1.0 + share * (ratio_from_db(level_db) - 1.0)
@@ -122,8 +146,10 @@ mod tests {
     #[test]
     fn only_what_lies_within_the_radius_changes() {
         let bench = Bench::plate();
-        let (bare, with) =
-            (bench.bare(), bench.with(&ForeignPatch, &[4.0, 0.05, -0.1, 0.06, 0.016]));
+        let (bare, with) = (
+            bench.bare(),
+            bench.with(&ForeignPatch, &[4.0, 0.05, -0.1, 0.06, 0.016, 0.0, 0.0, 0.0]),
+        );
         let mut seen = [0; 2];
         for ((shot, bare), with) in bench.shots.iter().zip(&bare).zip(&with) {
             let apart_m = (shot.xt_m - 0.05).hypot(shot.yt_m + 0.1);

@@ -1,4 +1,4 @@
-//! Gain that changes with the distance ρ from the centre of the field of view: edge_db·(ρ/0.5 m)² dB.
+//! Gain that changes over the field of view: a polynomial of low order in (u, v) = (x_t, y_t)/0.5 m, in dB.
 
 use crate::effects::effect::{About, Effect, EffectParameter, Level};
 use crate::effects::shot::{Shot, Stage};
@@ -6,19 +6,33 @@ use crate::units::ratio_from_db;
 
 pub(crate) struct FovGain;
 
-/// Distance from the centre at which the gain is `edge_db`, m.
+/// Distance from the centre at which a term has its full value, m.
 const EDGE_M: f64 = 0.5;
+/// Largest distance, in edges: beyond the reach of any field of view a polynomial must not run away.
+const MOST: f64 = 3.2;
+/// Largest gain or loss, dB.
+const MOST_DB: f64 = 300.0;
+
+const PARAMETERS: [EffectParameter; 6] = [
+    EffectParameter::new("edge_db", "dB", [-30.0, 30.0], 0.0, 0.5),
+    EffectParameter::new("slope_x_db", "dB", [-30.0, 30.0], 0.0, 0.5),
+    EffectParameter::new("slope_y_db", "dB", [-30.0, 30.0], 0.0, 0.5),
+    EffectParameter::new("oval_db", "dB", [-30.0, 30.0], 0.0, 0.5),
+    EffectParameter::new("twist_db", "dB", [-30.0, 30.0], 0.0, 0.5),
+    EffectParameter::new("steep_db", "dB", [-30.0, 30.0], 0.0, 0.5),
+];
 
 const ABOUT: About = About {
     name: "fov-gain",
     level: Level::Instrument,
-    description: "The antenna's gain is not the same over the field of view: it changes with the square of \
-         the distance from the centre.",
+    description: "The antenna's gain is not the same over the field of view. With (u, v) for the place over 0.5 m it \
+         changes by edge_db·(u² + v²), in dB; beside that by slope_x_db·u + slope_y_db·v, where the pattern is off the \
+         centre, by oval_db·(u² − v²) + twist_db·2uv, where it is not round, and by steep_db·(u² + v²)².",
     signature: "The residual grows or falls in rings about the centre of the field of view, whatever is \
          looked at. On a convex target that stands in the middle, angle and distance from the centre \
          rise together and the exponent of the diffuse lobe hides it: a second target off the centre \
          tells them apart.",
-    parameters: &[EffectParameter::new("edge_db", "dB", [-30.0, 30.0], 0.0, 0.5)],
+    parameters: &PARAMETERS,
     conflicts: &[],
 };
 
@@ -27,15 +41,29 @@ impl Effect for FovGain {
         &ABOUT
     }
 
+    /// Round; round with a slope; and any.
+    fn members(&self) -> &'static [&'static [usize]] {
+        &[&[0], &[0, 1, 2], &[0, 1, 2, 3, 4, 5]]
+    }
+
     fn starts(&self, _stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
-        vec![vec![-1.0], vec![1.0]]
+        let start = |edge_db| [edge_db, 0.0, 0.0, 0.0, 0.0, 0.0].to_vec();
+        [-1.0, 1.0].map(start).to_vec()
     }
 
     fn gain(&self, values: &[f64], _: &Stage, shot: &Shot) -> f64 {
-        let &[edge_db] = values else { return 1.0 };
-        // Beyond the reach of any field of view the square must not run away.
-        let off_centre = (shot.xt_m.powi(2) + shot.yt_m.powi(2)) / (EDGE_M * EDGE_M);
-        ratio_from_db(edge_db * off_centre.min(10.0))
+        let &[edge_db, slope_x_db, slope_y_db, oval_db, twist_db, steep_db] = values else {
+            return 1.0;
+        };
+        let off = (shot.xt_m.hypot(shot.yt_m) / EDGE_M).max(f64::MIN_POSITIVE);
+        let within = off.min(MOST) / off / EDGE_M;
+        let [u, v] = [shot.xt_m * within, shot.yt_m * within];
+        let square = u * u + v * v;
+        let gain_db = edge_db * square
+            + (slope_x_db * u + slope_y_db * v)
+            + (oval_db * (u * u - v * v) + 2.0 * twist_db * u * v)
+            + steep_db * square * square;
+        ratio_from_db(gain_db.clamp(-MOST_DB, MOST_DB))
     }
 }
 
@@ -45,14 +73,28 @@ mod tests {
     use crate::effects::testing::{Bench, db};
 
     #[test]
-    fn three_db_are_lost_at_half_a_metre_and_none_in_the_centre() {
+    fn each_term_has_its_value_at_the_edge() {
         let bench = Bench::plate();
-        let at = |xt_m, yt_m| {
+        let gain_db = |term: usize, xt_m: f64, yt_m: f64| {
+            let mut values = [0.0; 6];
+            values[term] = 2.0;
             let shot = Shot { xt_m, yt_m, ..bench.shots[0] };
-            db(FovGain.gain(&[-3.0], &bench.stage(), &shot))
+            db(FovGain.gain(&values, &bench.stage(), &shot))
         };
-        assert!((at(0.3, -0.4) + 3.0).abs() < 1e-9);
-        assert!((at(0.0, 0.25) + 0.75).abs() < 1e-9);
-        assert_eq!(at(0.0, 0.0), 0.0);
+        let slant = EDGE_M / 2f64.sqrt();
+        for (term, xt_m, yt_m, expected) in [
+            (0, EDGE_M, 0.0, 2.0),
+            (0, 0.0, 0.5 * EDGE_M, 0.5),
+            (1, -EDGE_M, 0.1, -2.0),
+            (2, 0.1, EDGE_M, 2.0),
+            (3, 0.0, EDGE_M, -2.0),
+            (4, slant, slant, 2.0),
+            (5, 0.0, 0.5 * EDGE_M, 0.125),
+            (5, 40.0, 0.0, 2.0 * MOST.powi(4)),
+            (0, 40.0, 0.0, 2.0 * MOST.powi(2)),
+        ] {
+            let found = gain_db(term, xt_m, yt_m);
+            assert!((found - expected).abs() < 1e-9 * expected.abs().max(1.0), "{term}: {found}");
+        }
     }
 }

@@ -8,9 +8,7 @@
 //! The substrate is lossless. Its index is the one that gives f_λ, n = (1 + √f_λ)/(1 − √f_λ), times a
 //! ratio, since backscatter alone does not determine f_λ.
 
-use crate::brdf::{
-    Brdf, Fresnel, Layer, Layered, Scattering, ScatteringModel, mirror_cosine,
-};
+use crate::brdf::{Brdf, Fresnel, Layer, Layered, Scattering, ScatteringModel, mirror_cosine};
 use crate::effects::effect::{About, Effect, EffectParameter, Level};
 use crate::effects::shot::{Shot, Stage};
 
@@ -115,8 +113,7 @@ impl Effect for ThinFilm {
         );
         let specular = film / bare.max(1e-9);
         let theta_rad = shot.hit.theta_rad();
-        let [film, bare] =
-            reflectances([thickness_m, index], eps_real, frequency_hz, theta_rad);
+        let [film, bare] = reflectances([thickness_m, index], eps_real, frequency_hz, theta_rad);
         let crossed = ((1.0 - film) / (1.0 - bare).max(1e-9)).powi(2);
         let diffuse = from_below * crossed + (1.0 - from_below) * film / bare.max(1e-9);
         let share = law.specular_share(retro, retro);

@@ -1,0 +1,145 @@
+//! Chirps that see no target: their silence, and what noise alone made them report.
+//!
+//! A receiver reports the strongest of the n cells of its gate, if that reaches the threshold T. Of noise N with L looks it
+//! is below y with the probability G(y)ⁿ, where G is that of one cell. A false alarm y then has the density n·g(y)·G(y)ⁿ⁻¹ in
+//! ln y, and silence has G(T)ⁿ. Where no gate is declared, n is the most likely one, so that only the powers of false alarms
+//! tell N: a cloud without any may have been cleaned, and its silence is no evidence.
+
+use super::observation::ReceiverLimits;
+use crate::effects::Receiver;
+use crate::fit::gamma_law::GammaLaw;
+
+/// Power over the threshold above which a detection is no false alarm: it would be far beyond the tail of any noise
+/// that is mostly below.
+pub(super) const MOST_OVER_THRESHOLD: f64 = 4.0;
+/// Share of detections among false alarms that noise did not make, and their density in ln power.
+const OUTLIERS: f64 = 1e-3;
+const OUTLIER_DENSITY: f64 = 1.0 / 1.4;
+/// Noise, as a share of the threshold, where none is declared.
+const LEAST_NOISE: f64 = 1e-3;
+/// Most cells of a gate.
+const MOST_CELLS: f64 = 1e6;
+/// Gain in ln likelihood of another noise level from which false alarms are not those of the model's.
+const UNLIKE: f64 = 12.0;
+/// Levels of noise that are tried, dB over the model's.
+const LEVELS_DB: std::ops::RangeInclusive<i32> = -12..=12;
+
+/// What chirps that see no target report.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Alarms {
+    /// Powers of false alarms, W.
+    pub powers_w: Vec<f64>,
+    /// Number of chirps that stay silent.
+    pub silent: usize,
+    /// Range cells of the gate; none where it is not declared.
+    pub cells: Option<f64>,
+    /// How much they count: 1, or less beside a sample of the chirps on the target.
+    pub weight: f64,
+}
+
+/// No chirps.
+pub(super) static NONE: Alarms =
+    Alarms { powers_w: Vec::new(), silent: 0, cells: None, weight: 1.0 };
+
+impl Alarms {
+    /// The same beside one of `every` chirps on the target.
+    pub(super) fn beside_sample(&self, every: usize) -> Alarms {
+        Alarms { weight: self.weight / every as f64, ..self.clone() }
+    }
+
+    /// ln likelihood under a receiver.
+    pub(super) fn ln_p(&self, receiver: &Receiver, limits: ReceiverLimits) -> f64 {
+        if self.silent == 0 && self.powers_w.is_empty() {
+            return 0.0;
+        }
+        let threshold_w = limits.threshold_w;
+        let law = GammaLaw::new(receiver.looks);
+        let ln_noise = receiver.noise_w.max(LEAST_NOISE * threshold_w).ln();
+        let ln_below = |power_w: f64| law.below(power_w.ln(), ln_noise).value;
+        let ln_silent = self.silent as f64 * ln_below(threshold_w);
+        let ln_all: f64 = ln_silent + self.powers_w.iter().map(|y| ln_below(*y)).sum::<f64>();
+        // The likeliest number of cells.
+        let likeliest = self.powers_w.len() as f64 / -ln_all.min(-f64::MIN_POSITIVE);
+        let cells = self.cells.unwrap_or(likeliest.min(MOST_CELLS));
+        if cells <= 0.0 {
+            return 0.0;
+        }
+        let mut sum = cells * ln_silent;
+        for power_w in &self.powers_w {
+            let density = law.detected(power_w.ln(), ln_noise).value + cells.ln();
+            let p = (density + (cells - 1.0) * ln_below(*power_w)).exp();
+            sum += ((1.0 - OUTLIERS) * p + OUTLIERS * OUTLIER_DENSITY).ln();
+        }
+        self.weight * sum
+    }
+
+    /// How far the noise of the likeliest level is from that of a receiver, dB, and what that gains; `None` where it is
+    /// likely enough.
+    pub(super) fn unlike(&self, receiver: &Receiver, limits: ReceiverLimits) -> Option<[f64; 2]> {
+        let at = |db: i32| {
+            let noise_w = receiver.noise_w * 10f64.powf(f64::from(db) / 10.0);
+            self.ln_p(&Receiver { noise_w, ..*receiver }, limits)
+        };
+        if receiver.noise_w <= 0.0 {
+            return None;
+        }
+        let best = LEVELS_DB.map(|db| (at(db), db)).max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let gain = best.0 - at(0);
+        (gain > UNLIKE).then_some([f64::from(best.1.abs()), gain])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::radar::random::{Key, Purpose};
+
+    const LIMITS: ReceiverLimits = ReceiverLimits { threshold_w: 1e-9, range_sd_m: 0.0 };
+
+    fn receiver(noise_w: f64) -> Receiver {
+        Receiver { looks: 4.0, noise_w, ..Receiver::LINEAR }
+    }
+
+    /// Chirps that report the strongest of 40 cells.
+    fn drawn(noise_w: f64, seed: u64) -> Alarms {
+        let mut alarms = Alarms { weight: 1.0, ..Alarms::default() };
+        for chirp in 0..4000 {
+            let mut draws = Key { seed, chirp, sub_ray: 0, purpose: Purpose::Fit }.draws();
+            let cells = (0..40).map(|_| noise_w * draws.gamma(4.0));
+            let strongest_w = cells.fold(0.0, f64::max);
+            if strongest_w >= LIMITS.threshold_w {
+                alarms.powers_w.push(strongest_w);
+            } else {
+                alarms.silent += 1;
+            }
+        }
+        alarms
+    }
+
+    #[test]
+    fn false_alarms_tell_the_noise() {
+        for (noise_w, seed) in [(2.2e-10, 1), (3e-10, 2), (4e-10, 3)] {
+            let alarms = drawn(noise_w, seed);
+            assert!(alarms.powers_w.len() > 100, "{}", alarms.powers_w.len());
+            let ln_p = |db: i32| {
+                let noise_w = noise_w * 10f64.powf(f64::from(db) / 20.0);
+                alarms.ln_p(&receiver(noise_w), LIMITS)
+            };
+            let best = (-8..=8).max_by(|a, b| ln_p(*a).total_cmp(&ln_p(*b))).unwrap();
+            assert!(best.abs() <= 1, "{noise_w}: {best} half dB");
+            assert_eq!(alarms.unlike(&receiver(noise_w), LIMITS), None);
+            let [off_db, _] = alarms.unlike(&receiver(0.5 * noise_w), LIMITS).unwrap();
+            assert!((2.0..=4.0).contains(&off_db), "{off_db}");
+        }
+    }
+
+    #[test]
+    fn silence_of_a_declared_gate_bounds_the_noise() {
+        let unknown = Alarms { silent: 4000, weight: 1.0, ..Alarms::default() };
+        assert_eq!(unknown.ln_p(&receiver(4e-10), LIMITS), 0.0);
+        let silent = Alarms { cells: Some(1.0), ..unknown };
+        let [low, high] = [1e-11, 4e-10].map(|noise_w| silent.ln_p(&receiver(noise_w), LIMITS));
+        assert!(low > -1.0 && high < -100.0, "{low} {high}");
+        assert_eq!(NONE.ln_p(&receiver(1e-10), LIMITS), 0.0);
+    }
+}
