@@ -191,6 +191,7 @@ impl Scan<'_> {
         let (mut strays, mut on_target, mut second) = (Vec::new(), 0, 0);
         let mut past_the_edge = HashSet::new();
         let (mut alarms, mut spoke) = (Alarms { weight: 1.0, ..Alarms::default() }, HashSet::new());
+        let mut alarm_ranges_m = Vec::new();
         let most_w = MOST_OVER_THRESHOLD * self.threshold_w;
         for point in cloud.points() {
             let chirp = if by_number { point.chirp } else { self.chirp_towards(point.point) };
@@ -225,6 +226,7 @@ impl Scan<'_> {
                         second += usize::from(!is_first);
                     } else if is_on_ray && point.power_w <= most_w && spoke.insert(shot.chirp) {
                         alarms.powers_w.push(point.power_w);
+                        alarm_ranges_m.push(range_m);
                         continue;
                     }
                 }
@@ -235,6 +237,15 @@ impl Scan<'_> {
         let detected = observations.iter().filter(|seen| seen.power_w.is_some()).count();
         let spoken = detected + spoke.len() + past_the_edge.len();
         alarms.silent = self.chirps.rays.len().saturating_sub(spoken);
+        let missing: Vec<&Ray<Global>> = self
+            .chirps
+            .rays
+            .iter()
+            .zip(&self.chirps.number)
+            .filter(|(_, number)| !shot_of_chirp.contains_key(*number))
+            .map(|(ray, _)| ray)
+            .collect();
+        alarms.near_target = expected_near(&missing, &alarm_ranges_m, target.as_ref());
         let cloud_match = CloudMatch { observations, strays, alarms };
         Assignment { cloud_match, on_target, second }
     }
@@ -266,6 +277,27 @@ impl Directions {
 fn is_past_an_edge(point: &CloudPoint, shot: &Shot, target: Option<&Nearest>) -> bool {
     let nearest_m = target.map_or(f64::INFINITY, |target| target.find(point.point.xyz).1);
     nearest_m <= GATE_M && off_ray_m(point, &shot.ray).length() <= ON_RAY_M
+}
+
+/// How many false alarms lie near the target by chance, where others at these ranges, m, do not: noise reports any range
+/// alike.
+fn expected_near(missing: &[&Ray<Global>], ranges_m: &[f64], target: Option<&Nearest>) -> f64 {
+    /// Ranges of the gate that are tried on each ray, and false alarms that tell where it lies.
+    const RANGES: u32 = 16;
+    const LEAST: usize = 10;
+    let Some(target) = target.filter(|_| ranges_m.len() >= LEAST) else { return 0.0 };
+    let nearest_m = ranges_m.iter().copied().fold(f64::INFINITY, f64::min);
+    let farthest_m = ranges_m.iter().copied().fold(0.0, f64::max);
+    let step_m = (farthest_m - nearest_m) / f64::from(RANGES);
+    let near = missing.par_iter().map(|ray| {
+        let places = (0..RANGES).map(|step| {
+            let range_m = nearest_m + (f64::from(step) + 0.5) * step_m;
+            ray.origin.xyz + range_m * ray.direction.xyz()
+        });
+        places.filter(|place| target.find(*place).1 <= GATE_M).count()
+    });
+    let near = near.sum::<usize>() as f64 / (f64::from(RANGES) * missing.len().max(1) as f64);
+    ranges_m.len() as f64 * near / (1.0 - near).max(1e-3)
 }
 
 /// Range of a point, m.

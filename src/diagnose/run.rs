@@ -150,6 +150,7 @@ fn detections_off_target(
     let model = state.space.model(scorer.problem.receiver, &state.fit.at);
     let strays = subject.strays.iter();
     let off = strays.filter(|stray| !stray.is_on_target(&model, subject.stage)).count();
+    let off = subject.alarms.beyond_chance(off);
     let points = subject.strays.len() + subject.detected();
     if off as f64 > MOST_STRAYS * points as f64 {
         return Err(DiagnoseError::Elsewhere { matched: points - off, points });

@@ -181,8 +181,11 @@ impl Scorer<'_> {
 
     /// Change of the data by a model with more effects.
     pub fn size(&self, state: &State, space: &Space, at: &DVector<f64>) -> Size {
-        let before = self.predict(state);
-        Size::of(self.problem.observations, &before, &self.problem.predict(space, at))
+        let Problem { observations, alarms, .. } = self.problem;
+        let [before, after] = [self.predict(state), self.problem.predict(space, at)];
+        let size = Size::of(observations, &before, &after);
+        let of_alarms_db = alarms.size_db([&before.receiver, &after.receiver], observations.len());
+        Size { mean_db: size.mean_db.hypot(of_alarms_db), ..size }
     }
 
     /// Randomised quantile residual of every shot.

@@ -115,6 +115,22 @@ pub trait Effect: Sync {
         1.0
     }
 
+    /// Multiplies the gains of some shots by [`gain`](Effect::gain); a shot that misses has none. An effect overrides it
+    /// where shots share work.
+    fn multiply_gains(
+        &self,
+        values: &[f64],
+        stage: &Stage,
+        shots: &[Option<&Shot>],
+        gains: &mut [f64],
+    ) {
+        for (gain, shot) in gains.iter_mut().zip(shots) {
+            if let Some(shot) = shot {
+                *gain *= self.gain(values, stage, shot);
+            }
+        }
+    }
+
     /// The values on which [`survey`](Effect::survey) depends; `None` for an effect without one.
     fn survey_key(&self, _values: &[f64]) -> Option<Vec<f64>> {
         None

@@ -12,7 +12,7 @@ use crate::brdf::Brdf;
 use crate::frames::{Global, Pose};
 
 /// Most parameters of an effect that has members.
-const MOST: usize = 16;
+const MOST: usize = 8;
 
 /// An effect with some of its parameters.
 struct Member {
@@ -113,6 +113,16 @@ impl Effect for Member {
 
     fn gain(&self, values: &[f64], stage: &Stage, shot: &Shot) -> f64 {
         whole!(self.gain(values, stage, shot))
+    }
+
+    fn multiply_gains(
+        &self,
+        values: &[f64],
+        stage: &Stage,
+        shots: &[Option<&Shot>],
+        gains: &mut [f64],
+    ) {
+        whole!(self.multiply_gains(values, stage, shots, gains));
     }
 
     fn survey_key(&self, values: &[f64]) -> Option<Vec<f64>> {

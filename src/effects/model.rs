@@ -147,8 +147,8 @@ impl Model<'_> {
             tasks.map(|shots| f_per_sr(stage, &laws, shots)).collect::<Vec<_>>().concat()
         });
         let gains = cache.gains.get_or_make(self.keys(|_| true), || {
-            let shots = intersections.par_iter();
-            shots.map(|at| at.as_ref().map_or(0.0, |(shot, _)| self.gain(stage, shot))).collect()
+            let tasks = intersections.par_chunks(SHOTS_PER_TASK);
+            tasks.map(|shots| self.gains(stage, shots)).collect::<Vec<_>>().concat()
         });
         // Equation (11), shot by shot.
         let mut arrived: Vec<Option<MeanEcho>> = intersections
@@ -196,12 +196,11 @@ impl Model<'_> {
             let tilted = shots.iter().flat_map(|shot| nodes.map(|(by, _)| tilted(shot, by)));
             let tilted: Vec<Option<Intersection>> = tilted.collect();
             let f_per_sr = f_per_sr(stage, &laws, &tilted);
-            let power_w = |(at, f_per_sr): (&Option<Intersection>, &f64)| {
-                at.as_ref().map_or(0.0, |(shot, _)| {
-                    self.gain(stage, shot) * self.scattered_w(stage, shot, *f_per_sr)
-                })
-            };
-            let power_w: Vec<f64> = tilted.iter().zip(&f_per_sr).map(power_w).collect();
+            let gains = self.gains(stage, &tilted);
+            let powers = tilted.iter().zip(f_per_sr).zip(gains).map(|((at, f_per_sr), gain)| {
+                at.as_ref().map_or(0.0, |(shot, _)| gain * self.scattered_w(stage, shot, f_per_sr))
+            });
+            let power_w: Vec<f64> = powers.collect();
             let of_shots = power_w.chunks_exact(NODES).zip(arrived);
             let tilts = of_shots.map(|(power_w, arrived)| {
                 let Some(untilted_w) = arrived.map(|echo| echo.power_w) else {
@@ -346,6 +345,18 @@ impl Model<'_> {
         }
         let beam = stage.beam(shot);
         stage.link.power_w(&beam, shot.hit.range_m, shot.hit.cos_theta, f_per_sr)
+    }
+
+    /// The products of all gains of some shots; 0 of a shot that misses.
+    fn gains(&self, stage: &Stage, shots: &[Option<Intersection>]) -> Vec<f64> {
+        let mut gains: Vec<f64> =
+            shots.iter().map(|shot| f64::from(u8::from(shot.is_some()))).collect();
+        let shots: Vec<Option<&Shot>> =
+            shots.iter().map(|shot| shot.as_ref().map(|(shot, _)| shot)).collect();
+        for (effect, values) in &self.effects {
+            effect.multiply_gains(values, stage, &shots, &mut gains);
+        }
+        gains
     }
 
     /// The product of all gains of a shot.

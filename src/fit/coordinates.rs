@@ -309,8 +309,9 @@ fn set_levels(model: &mut Brdf, k: f64, levels: [f64; 2]) {
     let [s, r] = levels.map(|level| level / (levels[0] + levels[1]).max(1.0));
     let k = if r <= 1.0 - s { k.clamp(r, 1.0 - s) } else { r / (r + s) };
     model.set_parameter("k", k);
-    model.set_parameter("specular.f_lambda", s / (1.0 - k));
-    model.set_parameter("diffuse.r_s", r / k);
+    // The quotients of levels that add up to 1 may exceed it by rounding.
+    model.set_parameter("specular.f_lambda", (s / (1.0 - k)).min(1.0));
+    model.set_parameter("diffuse.r_s", (r / k).min(1.0));
 }
 
 #[cfg(test)]

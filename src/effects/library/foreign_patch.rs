@@ -1,10 +1,12 @@
 //! A round place of another material: a change in dB within a radius along the surface.
 
+use glam::DVec3;
+
 use super::covering_layer::share_of_spot;
 use crate::effects::effect::{About, Effect, EffectParameter, Level};
 use crate::effects::place::Place;
 use crate::effects::shot::{Shot, Stage};
-use crate::frames::{Direction, Ray};
+use crate::frames::{Direction, Global, Point, Ray};
 use crate::radar::scan::PATTERN_RANGE_M;
 use crate::units::ratio_from_db;
 
@@ -30,24 +32,58 @@ const LEVELS_DB: [f64; 2] = [1.0, -1.0];
 /// Distance, in widths of the fade, beyond which at most 10⁻⁵ of the level remains.
 const FADED: f64 = 3.0;
 
-/// Distance of a shot from the centre on the target, m; infinite where it is more than `far_m`, which costs
-/// no ray.
-fn apart_m(stage: &Stage, shot: &Shot, [x_m, y_m]: [f64; 2], far_m: f64) -> f64 {
-    let axes = stage.geometry.radar.frames().global_from_target.rotation();
-    let aside = (x_m - shot.xt_m) * axes.x_axis + (y_m - shot.yt_m) * axes.y_axis;
-    // The shot is at least this far from the ray of the centre.
-    let forward = shot.ray.direction.xyz();
-    let beside_m =
-        aside.reject_from_normalized(forward).length() * shot.hit.range_m / PATTERN_RANGE_M;
-    let towards = Direction::new(PATTERN_RANGE_M * forward + aside);
-    let Some(direction) = towards.filter(|_| beside_m <= far_m) else { return f64::INFINITY };
-    // The centre belongs to the target, wherever that has moved.
-    let ray = Ray { origin: shot.ray.origin, direction };
-    let centre = match stage.geometry.bvh.closest(&ray) {
-        Some(hit) => hit.point.xyz,
-        None => ray.origin.xyz + shot.hit.range_m * direction.xyz(),
-    };
-    (shot.target.inverse() * shot.hit.point).xyz.distance(centre)
+/// The place of the target that a radar at `origin` sees at a place of the field of view, m; one 8 m away where its ray
+/// misses.
+fn centre(stage: &Stage, origin: Point<Global>, [x_m, y_m]: [f64; 2]) -> DVec3 {
+    let aimed = stage.geometry.radar.frames().global_from_target * Point::new(x_m, y_m, 0.0);
+    let Some(direction) = Direction::new(aimed.xyz - origin.xyz) else { return aimed.xyz };
+    let hit = stage.geometry.bvh.closest(&Ray { origin, direction });
+    hit.map_or(origin.xyz + PATTERN_RANGE_M * direction.xyz(), |hit| hit.point.xyz)
+}
+
+/// The outline of a patch and its level.
+struct Patch {
+    level_db: f64,
+    centre_m: [f64; 2],
+    radius_m: f64,
+    fade_m: f64,
+    tilted_db: f64,
+    oval: f64,
+    slant: f64,
+}
+
+impl Patch {
+    /// None where the patch is absent.
+    fn new(values: &[f64]) -> Option<Patch> {
+        let &[level_db, x_m, y_m, radius_m, fade_m, tilted_db, oval, slant] = values else {
+            return None;
+        };
+        let centre_m = [x_m, y_m];
+        let is_there = level_db != 0.0 || tilted_db != 0.0;
+        is_there.then_some(Patch { level_db, centre_m, radius_m, fade_m, tilted_db, oval, slant })
+    }
+
+    /// The gain of a shot; `centre` gives the place of the centre on the target for an origin of rays.
+    fn gain(&self, stage: &Stage, shot: &Shot, centre: impl FnOnce(Point<Global>) -> DVec3) -> f64 {
+        let [x_m, y_m] = [self.centre_m[0] - shot.xt_m, self.centre_m[1] - shot.yt_m];
+        let (sin, cos) = (2.0 * (-y_m).atan2(-x_m)).sin_cos();
+        let radius_m = self.radius_m * (self.oval * cos + self.slant * sin).exp();
+        // The shot is at least this far from the ray of the centre.
+        let axes = stage.geometry.radar.frames().global_from_target.rotation();
+        let aside = x_m * axes.x_axis + y_m * axes.y_axis;
+        let beside_m = aside.reject_from_normalized(shot.ray.direction.xyz()).length()
+            * shot.hit.range_m
+            / PATTERN_RANGE_M;
+        if beside_m > radius_m + FADED * self.fade_m {
+            return 1.0;
+        }
+        // The centre belongs to the target, wherever that has moved.
+        let on_target = (shot.target.inverse() * shot.hit.point).xyz;
+        let apart_m = on_target.distance(centre(shot.ray.origin));
+        let share = share_of_spot(radius_m - apart_m, self.fade_m);
+        let sin2_theta = 1.0 - shot.hit.cos_theta.powi(2);
+        1.0 + share * (ratio_from_db(self.level_db + self.tilted_db * sin2_theta) - 1.0)
+    }
 }
 
 /// The middles of the cells of each of some sides, m, that hold a shot, with the side.
@@ -122,19 +158,31 @@ impl Effect for ForeignPatch {
     }
 
     fn gain(&self, values: &[f64], stage: &Stage, shot: &Shot) -> f64 {
-        let &[level_db, x_m, y_m, radius_m, fade_m, tilted_db, oval, slant] = values else {
-            return 1.0;
-        };
-        let level_db = level_db + tilted_db * (1.0 - shot.hit.cos_theta.powi(2));
-        if level_db == 0.0 {
-            return 1.0;
+        let Some(patch) = Patch::new(values) else { return 1.0 };
+        patch.gain(stage, shot, |origin| centre(stage, origin, patch.centre_m))
+    }
+
+    /// Shots of one origin share the centre.
+    fn multiply_gains(
+        &self,
+        values: &[f64],
+        stage: &Stage,
+        shots: &[Option<&Shot>],
+        gains: &mut [f64],
+    ) {
+        let Some(patch) = Patch::new(values) else { return };
+        let mut latest: Option<(Point<Global>, DVec3)> = None;
+        for (gain, shot) in gains.iter_mut().zip(shots) {
+            let Some(shot) = shot else { continue };
+            *gain *= patch.gain(stage, shot, |origin| match latest {
+                Some((known, centre)) if known == origin => centre,
+                _ => {
+                    let centre = centre(stage, origin, patch.centre_m);
+                    latest = Some((origin, centre));
+                    centre
+                }
+            });
         }
-        let azimuth_rad = (shot.yt_m - y_m).atan2(shot.xt_m - x_m);
-        let (sin, cos) = (2.0 * azimuth_rad).sin_cos();
-        let radius_m = radius_m * (oval * cos + slant * sin).exp();
-        let apart_m = apart_m(stage, shot, [x_m, y_m], radius_m + FADED * fade_m);
-        let share = share_of_spot(radius_m - apart_m, fade_m);
-        1.0 + share * (ratio_from_db(level_db) - 1.0)
     }
 }
 
