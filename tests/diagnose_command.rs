@@ -123,6 +123,35 @@ fn speckle_that_neighbours_share_is_no_effect() {
     assert!((0.05..0.5).contains(&share), "{share}");
 }
 
+/// A radar that was never calibrated: its scene states a loss that is 15 dB wrong, to either side.
+#[test]
+fn the_level_of_a_radar_is_no_effect() {
+    let folder = rendered("4");
+    let at = folder.path();
+    for (loss_db, level_db) in [(27.5, 15.0), (-2.5, -15.0)] {
+        let off = SCENE.replace("[radar]\n", &format!("[radar]\nsystem_loss_db = {loss_db}\n"));
+        fs::write(at.join("off.toml"), &off).unwrap();
+        let arguments = ["diagnose", "-q", "out/cloud.ply", "--scene", "off.toml", "-o", "answer"];
+        let effects = ["--effects", "subsurface,noise-floor,foreign-patch"];
+        matdb(at).args(arguments).args(effects).assert().success();
+        let report = json(&at.join("answer/report.json"));
+        assert_eq!(report["verdict"], "no-missing-effect", "{}", report["effects"]);
+        let found = &report["base"]["level_db"];
+        let (value, sd) = (number(&found["value"]), number(&found["sd"]));
+        assert!((value - level_db).abs() < 1.96 * sd && sd < 1.5, "{found}");
+        let after = fs::read_to_string(at.join("answer/after.toml")).unwrap();
+        let after: toml::Table = after.parse().unwrap();
+        let loss_db = after["radar"]["system_loss_db"].as_float().unwrap();
+        assert!((loss_db - 12.5).abs() < 1.96 * sd, "{loss_db}");
+    }
+    // A radar that was calibrated has the level that it states.
+    let sure = SCENE.replace("[radar]\n", "[radar]\ncalibrated = true\n");
+    fs::write(at.join("sure.toml"), sure).unwrap();
+    let arguments = ["diagnose", "-q", "out/cloud.ply", "--scene", "sure.toml", "-o", "answer"];
+    matdb(at).args(arguments).args(["--effects", "subsurface"]).assert().success();
+    assert!(json(&at.join("answer/report.json"))["base"]["level_db"].is_null());
+}
+
 #[test]
 fn a_report_is_complete_and_its_table_gives_its_errors() {
     let folder = rendered("1");

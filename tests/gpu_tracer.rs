@@ -82,7 +82,9 @@ fn on_every_scene() {
         let scene = Scene::load(&support::scene(name)).unwrap();
         let mesh = &scene.target.mesh;
         let (hits, open) = traced_each(&gpu, mesh, &scene.chirps.rays);
-        assert!(hits.iter().flatten().count() > 200, "{name}");
+        // The corner is small in the field of view.
+        let least = if *name == "calibration-trihedral.toml" { 200 } else { 1_000 };
+        assert!(hits.iter().flatten().count() > least, "{name}");
         // A scan that has the symmetry of its target also meets edges, which are the processor's.
         let is_on_edge = |hit: &Option<Hit>| hit.is_some_and(|hit| is_on_edge(mesh, &hit));
         let beside = open.iter().zip(&hits).filter(|(open, hit)| **open && !is_on_edge(hit));

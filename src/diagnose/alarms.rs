@@ -63,7 +63,10 @@ impl Alarms {
         let ln_all: f64 = ln_silent + self.powers_w.iter().map(|y| ln_below(*y)).sum::<f64>();
         // The likeliest number of cells.
         let likeliest = self.powers_w.len() as f64 / -ln_all.min(-f64::MIN_POSITIVE);
-        let cells = self.cells.unwrap_or(likeliest.min(MOST_CELLS));
+        // Of a declared gate the part near the target is left out, where false alarms count as strays.
+        let count = self.powers_w.len() as f64;
+        let apart = if count > 0.0 { count / (count + self.near_target) } else { 1.0 };
+        let cells = self.cells.map_or(likeliest.min(MOST_CELLS), |cells| apart * cells);
         if cells <= 0.0 {
             return 0.0;
         }

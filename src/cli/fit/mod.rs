@@ -79,7 +79,7 @@ pub(super) struct Args {
     /// Angle between the specular and the diffuse piece of mse, degrees
     #[arg(long, value_name = "X", default_value_t = 6.0, allow_negative_numbers = true)]
     split_deg: f64,
-    /// Points that the search starts from
+    /// Points that the search starts from: the model's own, and the best of all shapes of its lobes
     #[arg(long, value_name = "N", default_value_t = 4, allow_negative_numbers = true)]
     starts: usize,
     /// Seed of the starts and of the residuals of missing chirps
