@@ -123,7 +123,11 @@ fn add_best<'a>(search: &Search, model: &mut Explanation<'a>, trials: &mut [Tria
         space.parameters_in_use(&fit.at)
     });
     let best = best.map_or(first, |best| *best);
+    // Of its family the simplest member.
     let name = trials[best.trial].candidate.name;
+    let family = tied.iter().filter(|one| trials[one.trial].candidate.name == name);
+    let best =
+        family.min_by_key(|one| trials[one.trial].candidate.numbers).map_or(best, |one| *one);
     let mut class: Vec<&'static str> = Vec::new();
     for other in tied.iter().map(|one| trials[one.trial].candidate.name) {
         if other != name && !class.contains(&other) {

@@ -212,18 +212,19 @@ impl<'a> Space<'a> {
     }
 
     /// Two points about another that differ in one unknown. Scattering models are smooth, so that one of the
-    /// two is the point itself; the parameters of effects are moved to both sides.
+    /// two may be the point itself; the parameters of effects are moved to both sides.
     pub fn difference(
         &self,
         at: &DVector<f64>,
         bounds: [&DVector<f64>; 2],
         index: usize,
         effect_step: f64,
+        laws_on_both_sides: bool,
     ) -> Difference {
         let is_law = index < self.base_len();
         let step = if is_law { LAW_STEP } else { effect_step };
         let more = moved(at, bounds, index, step);
-        let is_one_sided = is_law && more[index] > at[index];
+        let is_one_sided = is_law && !laws_on_both_sides && more[index] > at[index];
         let less = if is_one_sided { at.clone() } else { moved(at, bounds, index, -step) };
         let width = more[index] - less[index];
         Difference { ends: [more, less], width }

@@ -299,7 +299,10 @@ impl SceneFile {
     /// # Errors
     /// When `given` is no TOML.
     pub fn write(&self, given: &str) -> Result<String, FormatError> {
-        to_toml_as(self, given, &["name", "effect"])
+        // A level that a diagnosis found, too, where none was given.
+        let is_usual = self.radar.system_loss_db == Radar::default().system_loss_db;
+        let always = ["name", "effect", "system_loss_db"];
+        to_toml_as(self, given, if is_usual { &always[..2] } else { &always })
     }
 }
 
