@@ -28,7 +28,7 @@ pub fn scene_with_found(
     if let Some(level_db) = level_db {
         // Two decimals are finer than any level is known.
         let loss_db = file.radar.system_loss_db - level_db;
-        file.radar.system_loss_db = (100.0 * loss_db).round() / 100.0;
+        file.radar.system_loss_db = ((100.0 * loss_db).round() / 100.0).clamp(-200.0, 200.0);
     }
     file.effect.extend(entries(found, Level::Scene));
     file.radar.effect.extend(entries(found, Level::Instrument));

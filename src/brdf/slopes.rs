@@ -184,7 +184,7 @@ pub(super) fn narrow_ggx(slope2: f64, m2: f64, beam2: f64) -> f64 {
 /// The density of GGX's slopes seen by a beam that is not so narrow; 0 seen by one that is.
 #[inline(always)]
 pub(super) fn wide_ggx(slope2: f64, m2: f64, beam2: f64) -> f64 {
-    if beam2 / (m2 + slope2) <= MOST_OF_SERIES {
+    if beam2 * (1.0 / (m2 + slope2)) <= MOST_OF_SERIES {
         return 0.0;
     }
     mixture(|t| isotropic(slope2, m2 / t + beam2))

@@ -5,8 +5,7 @@
 //! ln y, and silence has G(T)ⁿ. Where no gate is declared, n is the most likely one, so that only the powers of false alarms
 //! tell N: a cloud without any may have been cleaned, and its silence is no evidence.
 
-use super::observation::ReceiverLimits;
-use super::score::DB;
+use super::observation::{DB, ReceiverLimits};
 use crate::effects::Receiver;
 use crate::fit::gamma_law::GammaLaw;
 
@@ -22,6 +21,9 @@ const LEAST_NOISE: f64 = 1e-3;
 const MOST_CELLS: f64 = 1e6;
 /// Gain in ln likelihood of another noise level from which false alarms are not those of the model's.
 const UNLIKE: f64 = 12.0;
+/// Difference from their law from which false alarms are something else, and the size that each then stands for, dB.
+const OFF_THEIR_LAW: f64 = 2.3;
+const OUTLYING_DB: f64 = 10.0;
 /// Levels of noise that are tried, dB over the model's.
 const LEVELS_DB: std::ops::RangeInclusive<i32> = -12..=12;
 
@@ -34,6 +36,8 @@ pub struct Alarms {
     pub near_target: f64,
     /// Number of chirps that stay silent.
     pub silent: usize,
+    /// Looks of the noise.
+    pub looks: f64,
     /// Range cells of the gate; none where it is not declared.
     pub cells: Option<f64>,
     /// How much they count: 1, or less beside a sample of the chirps on the target.
@@ -41,8 +45,14 @@ pub struct Alarms {
 }
 
 /// No chirps.
-pub(super) static NONE: Alarms =
-    Alarms { powers_w: Vec::new(), near_target: 0.0, silent: 0, cells: None, weight: 1.0 };
+pub(super) static NONE: Alarms = Alarms {
+    powers_w: Vec::new(),
+    near_target: 0.0,
+    silent: 0,
+    looks: 1.0,
+    cells: None,
+    weight: 1.0,
+};
 
 impl Alarms {
     /// The same beside one of `every` chirps on the target.
@@ -56,17 +66,11 @@ impl Alarms {
             return 0.0;
         }
         let threshold_w = limits.threshold_w;
-        let law = GammaLaw::new(receiver.looks);
+        let law = GammaLaw::new(self.looks);
         let ln_noise = receiver.noise_w.max(LEAST_NOISE * threshold_w).ln();
         let ln_below = |power_w: f64| law.below(power_w.ln(), ln_noise).value;
         let ln_silent = self.silent as f64 * ln_below(threshold_w);
-        let ln_all: f64 = ln_silent + self.powers_w.iter().map(|y| ln_below(*y)).sum::<f64>();
-        // The likeliest number of cells.
-        let likeliest = self.powers_w.len() as f64 / -ln_all.min(-f64::MIN_POSITIVE);
-        // Of a declared gate the part near the target is left out, where false alarms count as strays.
-        let count = self.powers_w.len() as f64;
-        let apart = if count > 0.0 { count / (count + self.near_target) } else { 1.0 };
-        let cells = self.cells.map_or(likeliest.min(MOST_CELLS), |cells| apart * cells);
+        let cells = self.cells(ln_below, threshold_w);
         if cells <= 0.0 {
             return 0.0;
         }
@@ -94,13 +98,59 @@ impl Alarms {
         DB * (after.noise_w / before.noise_w).ln().abs() * (alarms / all.max(1.0)).sqrt()
     }
 
-    /// How far the noise of the likeliest level is from that of a receiver, dB, and what that gains; `None` where it is
-    /// likely enough.
+    /// The number of cells that count: the likeliest, or those of a declared gate less its part near the target, where false
+    /// alarms count as strays.
+    fn cells(&self, ln_below: impl Fn(f64) -> f64, threshold_w: f64) -> f64 {
+        let count = self.powers_w.len() as f64;
+        if let Some(cells) = self.cells {
+            return if count > 0.0 { cells * count / (count + self.near_target) } else { cells };
+        }
+        let ln_silent = self.silent as f64 * ln_below(threshold_w);
+        let ln_all: f64 = ln_silent + self.powers_w.iter().map(|y| ln_below(*y)).sum::<f64>();
+        (count / -ln_all.min(-f64::MIN_POSITIVE)).min(MOST_CELLS)
+    }
+
+    /// √n times the largest difference between the distribution of the powers and that of false alarms of a
+    /// receiver: beyond 2.3 once in 50 000 times by chance (Kolmogorov and Smirnov); 0 for few.
+    fn off_their_law(&self, receiver: &Receiver, limits: ReceiverLimits) -> f64 {
+        const FEW: usize = 20;
+        if self.powers_w.len() < FEW {
+            return 0.0;
+        }
+        let threshold_w = limits.threshold_w;
+        let law = GammaLaw::new(self.looks);
+        let ln_noise = receiver.noise_w.max(LEAST_NOISE * threshold_w).ln();
+        let ln_below = |power_w: f64| law.below(power_w.ln(), ln_noise).value;
+        let cells = self.cells(ln_below, threshold_w);
+        let mut sorted = self.powers_w.clone();
+        sorted.sort_by(f64::total_cmp);
+        // Probabilities of a higher power, which keep their digits in the tail.
+        let above = |power_w: f64| -(cells * ln_below(power_w)).exp_m1();
+        let [all, beyond] = [threshold_w, MOST_OVER_THRESHOLD * threshold_w].map(above);
+        let count = sorted.len() as f64;
+        let mut largest = 0.0f64;
+        for (number, power_w) in sorted.iter().enumerate() {
+            let expected = ((all - above(*power_w)) / (all - beyond)).clamp(0.0, 1.0);
+            let [low, high] = [number, number + 1].map(|number| number as f64 / count);
+            let off = (expected - low).abs().max((high - expected).abs());
+            // A noise so low that none is expected explains none.
+            largest = largest.max(if off.is_finite() { off } else { 1.0 });
+        }
+        count.sqrt() * largest
+    }
+
+    /// How far the noise of the likeliest level is from that of a receiver, dB, and what that gains in ln p, or how
+    /// unlikely their powers are; `None` where the receiver's is likely enough.
     pub(super) fn unlike(&self, receiver: &Receiver, limits: ReceiverLimits) -> Option<[f64; 2]> {
         let at = |db: i32| {
             let noise_w = receiver.noise_w * 10f64.powf(f64::from(db) / 10.0);
             self.ln_p(&Receiver { noise_w, ..*receiver }, limits)
         };
+        let off = self.off_their_law(receiver, limits);
+        if off > OFF_THEIR_LAW {
+            let share = self.powers_w.len() as f64 / (self.powers_w.len() + self.silent) as f64;
+            return Some([OUTLYING_DB * share.sqrt(), 2.0 * off * off]);
+        }
         if receiver.noise_w <= 0.0 {
             return None;
         }
@@ -123,7 +173,7 @@ mod tests {
 
     /// Chirps that report the strongest of 40 cells.
     fn drawn(noise_w: f64, seed: u64) -> Alarms {
-        let mut alarms = Alarms { weight: 1.0, ..Alarms::default() };
+        let mut alarms = Alarms { weight: 1.0, looks: 4.0, ..Alarms::default() };
         for chirp in 0..4000 {
             let mut draws = Key { seed, chirp, sub_ray: 0, purpose: Purpose::Fit }.draws();
             let cells = (0..40).map(|_| noise_w * draws.gamma(4.0));
@@ -154,9 +204,19 @@ mod tests {
         }
     }
 
+    /// Echoes of something of any strength, as of clutter that the scene does not have.
+    #[test]
+    fn what_noise_did_not_make_is_no_false_alarm() {
+        let mut alarms = Alarms { silent: 4000, weight: 1.0, looks: 4.0, ..Alarms::default() };
+        alarms.powers_w = (0..300).map(|k| 1e-9 * 4f64.powf(f64::from(k) / 300.0)).collect();
+        for noise_w in [0.0, 1e-11, 3e-10] {
+            assert!(alarms.unlike(&receiver(noise_w), LIMITS).is_some(), "{noise_w}");
+        }
+    }
+
     #[test]
     fn silence_of_a_declared_gate_bounds_the_noise() {
-        let unknown = Alarms { silent: 4000, weight: 1.0, ..Alarms::default() };
+        let unknown = Alarms { silent: 4000, weight: 1.0, looks: 4.0, ..Alarms::default() };
         assert_eq!(unknown.ln_p(&receiver(4e-10), LIMITS), 0.0);
         let silent = Alarms { cells: Some(1.0), ..unknown };
         let [low, high] = [1e-11, 4e-10].map(|noise_w| silent.ln_p(&receiver(noise_w), LIMITS));

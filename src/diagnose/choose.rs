@@ -58,11 +58,24 @@ pub(super) fn choose_effects<'a>(
         let mut trials = search.trials(&model.state, effects, round, model.largest());
         let has_grown =
             add_best(search, &mut model, &mut trials) || add_pair(search, &mut model, &mut trials);
-        ranking.extend(trials.into_iter().map(|trial| trial.candidate));
+        // Of each family the member that was accepted, or the best.
+        let mut candidates: Vec<Candidate> =
+            trials.into_iter().map(|trial| trial.candidate).collect();
+        candidates.sort_by_key(|candidate| !candidate.accepted);
+        let mut names = Vec::new();
+        candidates.retain(|candidate| {
+            let is_first = !names.contains(&candidate.name);
+            names.push(candidate.name);
+            is_first
+        });
+        candidates.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        ranking.extend(candidates);
         if !has_grown {
             break;
         }
-        if let Some(better) = scorer.better_base(&base, &model.state) {
+        if round < MOST_ROUNDS
+            && let Some(better) = scorer.better_base(&base, &model.state)
+        {
             (search.notify)(
                 "starting again: with an effect the laws have found a better place without it",
             );

@@ -9,7 +9,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::DVector;
 
-use super::score::DB;
+use super::observation::DB;
 use crate::brdf::{Brdf, Scattering};
 use crate::fit::coordinates::Coordinates;
 use crate::fit::minimise::Local;

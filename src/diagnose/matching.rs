@@ -189,12 +189,13 @@ impl Scan<'_> {
         let target = Nearest::new(&places);
         let mut observations = vec![Observation::default(); shots.len()];
         let (mut strays, mut on_target, mut second) = (Vec::new(), 0, 0);
-        let mut past_the_edge = HashSet::new();
+        let (mut past_the_edge, mut chirps_with_points) = (HashSet::new(), HashSet::new());
         let (mut alarms, mut spoke) = (Alarms { weight: 1.0, ..Alarms::default() }, HashSet::new());
         let mut alarm_ranges_m = Vec::new();
         let most_w = MOST_OVER_THRESHOLD * self.threshold_w;
         for point in cloud.points() {
             let chirp = if by_number { point.chirp } else { self.chirp_towards(point.point) };
+            chirps_with_points.extend(chirp);
             let index = chirp.and_then(|chirp| shot_of_chirp.get(&chirp).copied());
             if let Some((shot, observation)) =
                 index.and_then(|index| Some((shots.get(index)?, observations.get_mut(index)?)))
@@ -206,7 +207,11 @@ impl Scan<'_> {
                     on_target += 1;
                     let power_w = Some(point.power_w);
                     *observation = Observation { power_w, range_m: Some(range_m) };
-                } else if !is_near && point.power_w <= most_w && spoke.insert(shot.chirp) {
+                } else if !is_near
+                    && off_ray_m(point, &shot.ray).length() <= ON_RAY_M
+                    && point.power_w <= most_w
+                    && spoke.insert(shot.chirp)
+                {
                     alarms.powers_w.push(point.power_w);
                 } else {
                     second += usize::from(is_near);
@@ -233,10 +238,8 @@ impl Scan<'_> {
                 strays.push(Stray { shot, range_m });
             }
         }
-        // Silent are the chirps that miss, and those whose target is too weak.
-        let detected = observations.iter().filter(|seen| seen.power_w.is_some()).count();
-        let spoken = detected + spoke.len() + past_the_edge.len();
-        alarms.silent = self.chirps.rays.len().saturating_sub(spoken);
+        // Silent are the chirps without any detection.
+        alarms.silent = self.chirps.rays.len().saturating_sub(chirps_with_points.len());
         let missing: Vec<&Ray<Global>> = self
             .chirps
             .rays

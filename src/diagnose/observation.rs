@@ -2,6 +2,9 @@
 
 use crate::effects::MeanEcho;
 
+/// dB in one e-fold.
+pub(super) const DB: f64 = 10.0 / std::f64::consts::LN_10;
+
 /// The record of one chirp that meets the target.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Observation {

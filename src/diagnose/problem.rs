@@ -8,8 +8,7 @@ use rayon::prelude::*;
 use super::alarms::Alarms;
 use super::level::MOST_OFF_DB;
 use super::likelihood::{Likelihood, Term};
-use super::observation::{Observation, ReceiverLimits};
-use super::score::DB;
+use super::observation::{DB, Observation, ReceiverLimits};
 use super::shared::SharedSpeckle;
 use super::space::Space;
 use crate::effects::{Ceiling, Model, Prediction, PredictionCache, Receiver, Shot, Stage};
@@ -197,7 +196,9 @@ impl Problem<'_> {
     pub fn mean_slopes(&self, space: &Space, at: &DVector<f64>) -> Vec<Vec<f64>> {
         let [lower, upper] = space.bounds();
         let mut all = Vec::new();
-        for index in 0..at.len() {
+        // The scale of the laws stands for the level, too.
+        let others = space.level_index().filter(|level| *level > 0);
+        for index in (0..at.len()).filter(|index| Some(*index) != others) {
             let difference = space.difference(at, [&lower, &upper], index, EFFECT_STEP, false);
             let [more, less] = difference.ends.map(|end| self.ln_means(space, &end));
             let width = difference.width.max(f64::MIN_POSITIVE);

@@ -63,6 +63,7 @@ impl MeasuredScene<'_> {
         let (receiver, declared) = declared_receiver(radar);
         let mut matched = match_cloud(cloud, &scene.chirps, &shots, declared.threshold_w)?;
         matched.alarms.cells = radar.gate_cells();
+        matched.alarms.looks = radar.noise_looks();
         let subject = Subject {
             stage: &stage,
             laws,

@@ -9,6 +9,7 @@ use statrs::function::gamma::ln_gamma;
 
 use super::folds::Folds;
 use super::likelihood::Likelihood;
+pub(super) use super::observation::DB;
 use super::observation::ReceiverLimits;
 use super::problem::Problem;
 use super::shared::ALONE;
@@ -16,9 +17,6 @@ use crate::effects::Prediction;
 
 /// Errors below this multiple of the noise floor count as at the floor, with no excess to explain.
 pub(super) const AT_THE_FLOOR: f64 = 1.05;
-
-/// dB in one e-fold.
-pub(super) const DB: f64 = 10.0 / std::f64::consts::LN_10;
 
 /// The score of a prediction at one shot.
 #[derive(Clone, Copy, Debug, PartialEq)]

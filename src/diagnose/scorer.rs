@@ -244,7 +244,8 @@ impl Scorer<'_> {
     pub fn ln_likelihood_with(&self, space: &Space, fit: &Fit, structure: &Structure) -> f64 {
         let prediction = self.problem.predict(space, &fit.at);
         let terms = terms(&self.problem, &prediction, &structure.ln_factor);
-        terms.iter().map(|term| term.ln_p).sum()
+        let of_shots: f64 = terms.iter().map(|term| term.ln_p).sum();
+        of_shots + self.problem.beside(space, &fit.at)
     }
 }
 

@@ -51,16 +51,23 @@ impl<'a> Screen<'a> {
             .iter()
             .take(space.base_len())
             .any(|slopes| product(&terms, slopes, slopes) * OPEN * OPEN < 1.0);
-        slopes.retain(|slopes| slopes.iter().any(|s| s.ln_mean != 0.0 || s.range_m != 0.0));
+        // What else pulls the unknowns that change means or ranges.
+        let changes =
+            |slopes: &[Slope]| slopes.iter().any(|s| s.ln_mean != 0.0 || s.range_m != 0.0);
+        let kept: Vec<usize> = (0..slopes.len()).filter(|&index| changes(&slopes[index])).collect();
+        slopes = kept.iter().map(|&index| std::mem::take(&mut slopes[index])).collect();
+        let beside = problem.local_beside(space, at, [&lower, &upper]);
         let curvature = DMatrix::from_fn(slopes.len(), slopes.len(), |i, j| {
-            product(&terms, &slopes[i], &slopes[j])
+            product(&terms, &slopes[i], &slopes[j]) + beside.curvature[(kept[i], kept[j])]
         });
         // A small ridge keeps the matrix positive where unknowns do the same.
         let ridge = 1e-9 * curvature.diagonal().iter().fold(0.0, |most: f64, x| most.max(*x));
         let curvature = curvature + DMatrix::identity(slopes.len(), slopes.len()) * ridge;
         let absorbs = curvature.cholesky();
-        let pulls = slopes.iter().map(|slopes| {
-            terms.iter().zip(slopes).map(|(term, slope)| along(term, Change::from(slope))).sum()
+        let pulls = slopes.iter().zip(&kept).map(|(slopes, &index)| {
+            let pulls = terms.iter().zip(slopes);
+            let pull: f64 = pulls.map(|(term, slope)| along(term, Change::from(slope))).sum();
+            pull - beside.gradient[index]
         });
         let own: DVector<f64> = DVector::from_iterator(slopes.len(), pulls);
         let own_step = absorbs.as_ref().map_or(DVector::zeros(slopes.len()), |c| c.solve(&own));

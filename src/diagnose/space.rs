@@ -4,7 +4,7 @@
 use nalgebra::DVector;
 
 use super::level::{MOST_OFF_DB, prior};
-use super::score::DB;
+use super::observation::DB;
 use crate::brdf::Brdf;
 use crate::effects::{Effect, Model, Receiver, Shot, rank};
 use crate::fit::FitError;
@@ -75,7 +75,7 @@ impl<'a> Space<'a> {
             let here = shots.iter().filter(|shot| usize::from(shot.region) == region);
             if here.count() >= LEAST_SHOTS {
                 let coordinates = Coordinates::new(law, &frequencies(law), &[], Some(looks))?;
-                free.push((region, coordinates));
+                free.push((region, coordinates.lowering_levels()));
             }
         }
         Ok(Space { laws: laws.to_vec(), free, ln_level: None, declared, effects: Vec::new() })

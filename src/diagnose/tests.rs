@@ -21,10 +21,10 @@ const SIDE: usize = 56;
 const SEEDS: u64 = 12;
 const RANGE_SD_M: f64 = 1e-3;
 
-/// The paper's mixture with S and R that backscatter sees.
 /// −77 dBm.
 const THRESHOLD_W: f64 = 2e-11;
 
+/// The paper's mixture with S and R that backscatter sees.
 fn law() -> Brdf {
     let specular = CookTorrance {
         f_lambda: 0.055,

@@ -140,8 +140,11 @@ impl<'p> Search<'p> {
         for trial in trials {
             let promised = trial.candidate.gain;
             let is_full = kept.len() == SHORTLIST && !kept.contains(&trial.candidate.name);
-            if is_full || promised < hopeless.max(SHARE_OF_BEST * best) {
+            if promised < hopeless.max(SHARE_OF_BEST * best) {
                 break;
+            }
+            if is_full {
+                continue;
             }
             (self.notify)(&format!("round {round}: refitting with {}", trial.effect.name()));
             self.refit(state, trial);

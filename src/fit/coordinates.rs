@@ -138,6 +138,8 @@ pub(crate) struct Coordinates {
     looks: f64,
     /// Divergence of the beam that sees the model, rad.
     beam_rad: f64,
+    /// Whether levels that no law can have, S + R > 1, are lowered together.
+    lowers_levels: bool,
 }
 
 /// The frequencies in a law: they belong to the radar, so that a fit must not search them.
@@ -179,12 +181,24 @@ impl Coordinates {
         for (name, range) in bounds {
             narrow(&mut list, name, *range)?;
         }
-        Ok(Coordinates { list, base, gauge, looks: looks.unwrap_or(1.0), beam_rad: 0.0 })
+        Ok(Coordinates {
+            list,
+            base,
+            gauge,
+            looks: looks.unwrap_or(1.0),
+            beam_rad: 0.0,
+            lowers_levels: false,
+        })
     }
 
     /// The same coordinates of a model that a beam of this divergence sees, rad.
     pub fn seen_by(self, beam_rad: f64) -> Coordinates {
         Coordinates { beam_rad, ..self }
+    }
+
+    /// The same coordinates of a model that stays one whatever its levels: those that no law can have are lowered.
+    pub fn lowering_levels(self) -> Coordinates {
+        Coordinates { lowers_levels: true, ..self }
     }
 
     /// Number of coordinates.
@@ -243,6 +257,11 @@ impl Coordinates {
             }
         }
         if let Some(k) = self.gauge {
+            let sum = levels[0] + levels[1];
+            if self.lowers_levels && sum > 1.0 {
+                // Not to exceed 1 by rounding.
+                levels = levels.map(|level| (1.0 - 1e-12) * level / sum);
+            }
             set_levels(&mut model, k, levels);
         }
         model
@@ -303,15 +322,12 @@ fn narrow(list: &mut [Coordinate], name: &str, [min, max]: [f64; 2]) -> Result<(
     Ok(())
 }
 
-/// Sets k, f_λ and r_s from S and R: k as near to the gauge's as f_λ ≤ 1 and r_s ≤ 1 allow. Levels that no k allows,
-/// S + R > 1, are lowered together.
-fn set_levels(model: &mut Brdf, k: f64, levels: [f64; 2]) {
-    let [s, r] = levels.map(|level| level / (levels[0] + levels[1]).max(1.0));
+/// Sets k, f_λ and r_s from S and R: k as near to the gauge's as f_λ ≤ 1 and r_s ≤ 1 allow.
+fn set_levels(model: &mut Brdf, k: f64, [s, r]: [f64; 2]) {
     let k = if r <= 1.0 - s { k.clamp(r, 1.0 - s) } else { r / (r + s) };
     model.set_parameter("k", k);
-    // The quotients of levels that add up to 1 may exceed it by rounding.
-    model.set_parameter("specular.f_lambda", (s / (1.0 - k)).min(1.0));
-    model.set_parameter("diffuse.r_s", (r / k).min(1.0));
+    model.set_parameter("specular.f_lambda", s / (1.0 - k));
+    model.set_parameter("diffuse.r_s", r / k);
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ use super::chirp::{Chirp, ChirpEntry};
 use super::error::Check;
 use super::f5::F5;
 use super::mirror::Optics;
-use super::noise::Noise;
+use super::noise::{Addition, Noise};
 use super::polarisation::Polarisation;
 use super::receiver::Receiver;
 use super::scan::pattern::{self, Pattern};
@@ -242,7 +242,16 @@ impl Radar {
     pub fn gate_cells(&self) -> Option<f64> {
         let noise = self.noise?;
         let by_length = noise.gate_length_m.map(|m| m / self.chirp().range_resolution_m());
-        noise.gate_cells.or(by_length)
+        noise.gate_cells.or(by_length).map(|cells| cells.max(1.0))
+    }
+
+    /// Looks of a cell with noise alone: those of the speckle, or one where noise joins their average or there is no
+    /// speckle.
+    pub fn noise_looks(&self) -> f64 {
+        match (self.noise, self.speckle) {
+            (Some(Noise { added: Addition::BeforeLooks, .. }), Some(speckle)) => speckle.looks,
+            _ => 1.0,
+        }
     }
 
     /// The form of its speckle, for a scan that several antennas see or not, with several paths per chirp or not.

@@ -1,4 +1,4 @@
-//! A round place of another material: a change in dB within a radius along the surface.
+//! A place of another material: a change in dB within a round or oval outline along the surface.
 
 use glam::DVec3;
 

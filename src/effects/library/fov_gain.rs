@@ -41,7 +41,7 @@ impl Effect for FovGain {
         &ABOUT
     }
 
-    /// Round; round with a slope; and any.
+    /// Round; round with a slope; and also oval and steep.
     fn members(&self) -> &'static [&'static [usize]] {
         &[&[0], &[0, 1, 2], &[0, 1, 2, 3, 4, 5]]
     }
