@@ -144,19 +144,18 @@ impl Alarms {
     pub(super) fn unlike(&self, receiver: &Receiver, limits: ReceiverLimits) -> Option<[f64; 2]> {
         let at = |db: i32| {
             let noise_w = receiver.noise_w * 10f64.powf(f64::from(db) / 10.0);
-            self.ln_p(&Receiver { noise_w, ..*receiver }, limits)
+            Receiver { noise_w, ..*receiver }
         };
-        let off = self.off_their_law(receiver, limits);
+        let ln_p = |db: i32| self.ln_p(&at(db), limits);
+        let best = LEVELS_DB.max_by(|a, b| ln_p(*a).total_cmp(&ln_p(*b))).unwrap_or(0);
+        let gain = ln_p(best) - ln_p(0);
+        // No level makes the powers of something else those of noise.
+        let off = self.off_their_law(&at(best), limits);
         if off > OFF_THEIR_LAW {
             let share = self.powers_w.len() as f64 / (self.powers_w.len() + self.silent) as f64;
             return Some([OUTLYING_DB * share.sqrt(), 2.0 * off * off]);
         }
-        if receiver.noise_w <= 0.0 {
-            return None;
-        }
-        let best = LEVELS_DB.map(|db| (at(db), db)).max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let gain = best.0 - at(0);
-        (gain > UNLIKE).then_some([f64::from(best.1.abs()), gain])
+        (gain > UNLIKE).then_some([f64::from(best.abs()), gain])
     }
 }
 

@@ -1,9 +1,8 @@
 //! A layer over part of the target, such as clothing: −loss/cos θ dB beyond a line across the field of
 //! view, which is a plane through the radar, or within an oval outline, a cone from the radar.
 
-use super::foreign_patch::cells_with_shots;
 use crate::effects::effect::{About, Effect, EffectParameter, Level};
-use crate::effects::place::{Place, along_m};
+use crate::effects::place::{Place, along_m, cells_with_shots};
 use crate::effects::shot::{Shot, Stage};
 use crate::units::ratio_from_db;
 

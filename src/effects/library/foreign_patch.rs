@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::covering_layer::share_of_spot;
 use crate::effects::effect::{About, Effect, EffectParameter, Level};
-use crate::effects::place::Place;
+use crate::effects::place::{Place, cells_with_shots};
 use crate::effects::shot::{Shot, Stage};
 use crate::frames::{Direction, Global, Point, Ray};
 use crate::radar::scan::PATTERN_RANGE_M;
@@ -23,9 +23,8 @@ const PARAMETERS: [EffectParameter; 8] = [
     EffectParameter::new("slant", "1", [-0.6, 0.6], 0.0, 0.1),
 ];
 
-/// Sides of the cells where a search begins, m, and most of them along an edge of the target.
+/// Sides of the cells where a search begins, m.
 const SIDES_M: [f64; 2] = [0.05, 0.12];
-const MOST_CELLS: usize = 20;
 /// Levels where it begins, dB.
 const LEVELS_DB: [f64; 2] = [1.0, -1.0];
 
@@ -84,36 +83,6 @@ impl Patch {
         let sin2_theta = 1.0 - shot.hit.cos_theta.powi(2);
         1.0 + share * (ratio_from_db(self.level_db + self.tilted_db * sin2_theta) - 1.0)
     }
-}
-
-/// The middles of the cells of each of some sides, m, that hold a shot, with the side.
-pub(super) fn cells_with_shots(shots: &[Shot], sides_m: [f64; 2]) -> Vec<([f64; 2], f64)> {
-    let [left, right] = span(shots.iter().map(|shot| shot.xt_m));
-    let [low, high] = span(shots.iter().map(|shot| shot.yt_m));
-    let mut found = Vec::new();
-    for side_m in sides_m {
-        let (columns, rows) = (cells(right - left, side_m), cells(high - low, side_m));
-        let (width, height) = ((right - left) / columns as f64, (high - low) / rows as f64);
-        for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |c| (row, c))) {
-            let [x, y] = [left + (column as f64 + 0.5) * width, low + (row as f64 + 0.5) * height];
-            let reach_m = (0.5 * side_m).clamp(0.02, 0.3);
-            if shots.iter().any(|l| (l.xt_m - x).hypot(l.yt_m - y) < reach_m) {
-                found.push(([x, y], side_m));
-            }
-        }
-    }
-    found
-}
-
-/// Number of cells of a side along a length, both in m.
-fn cells(length_m: f64, side_m: f64) -> usize {
-    ((length_m / side_m).ceil() as usize).clamp(1, MOST_CELLS)
-}
-
-/// Least and largest of some numbers; zeros when there are none.
-fn span(values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
-    let (least, most) = (values.clone().reduce(f64::min), values.reduce(f64::max));
-    [least.unwrap_or(0.0), most.unwrap_or(0.0)]
 }
 
 const ABOUT: About = About {
