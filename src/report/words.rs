@@ -189,7 +189,7 @@ mod tests {
         let three = |sd| Triple { value: [0.1, -1.25, 0.0], sd, unit: "m" };
         let mut parameters = Parameters::default();
         for name in ["centre_x_m", "centre_y_m", "translation_z_m"] {
-            parameters.numbers.insert(name, number.clone());
+            parameters.numbers.insert(name, number);
         }
         parameters.triples.insert("centre_m", three(None));
         parameters.triples.insert("translation_m", three(Some([0.01; 3])));
