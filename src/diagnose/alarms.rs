@@ -65,19 +65,15 @@ impl Alarms {
         if self.silent == 0 && self.powers_w.is_empty() {
             return 0.0;
         }
-        let threshold_w = limits.threshold_w;
-        let law = GammaLaw::new(self.looks);
-        let ln_noise = receiver.noise_w.max(LEAST_NOISE * threshold_w).ln();
-        let ln_below = |power_w: f64| law.below(power_w.ln(), ln_noise).value;
-        let ln_silent = self.silent as f64 * ln_below(threshold_w);
-        let cells = self.cells(ln_below, threshold_w);
+        let cell = self.cell(receiver, limits);
+        let cells = self.cells(&cell, limits.threshold_w);
         if cells <= 0.0 {
             return 0.0;
         }
-        let mut sum = cells * ln_silent;
+        let mut sum = cells * self.silent as f64 * cell.ln_below(limits.threshold_w);
         for power_w in &self.powers_w {
-            let density = law.detected(power_w.ln(), ln_noise).value + cells.ln();
-            let p = (density + (cells - 1.0) * ln_below(*power_w)).exp();
+            let density = cell.ln_density(*power_w) + cells.ln();
+            let p = (density + (cells - 1.0) * cell.ln_below(*power_w)).exp();
             sum += ((1.0 - OUTLIERS) * p + OUTLIERS * OUTLIER_DENSITY).ln();
         }
         self.weight * sum
@@ -98,15 +94,20 @@ impl Alarms {
         DB * (after.noise_w / before.noise_w).ln().abs() * (alarms / all.max(1.0)).sqrt()
     }
 
+    fn cell(&self, receiver: &Receiver, limits: ReceiverLimits) -> Cell {
+        let ln_noise = receiver.noise_w.max(LEAST_NOISE * limits.threshold_w).ln();
+        Cell { law: GammaLaw::new(self.looks), ln_noise }
+    }
+
     /// The number of cells that count: the likeliest, or those of a declared gate less its part near the target, where false
     /// alarms count as strays.
-    fn cells(&self, ln_below: impl Fn(f64) -> f64, threshold_w: f64) -> f64 {
+    fn cells(&self, cell: &Cell, threshold_w: f64) -> f64 {
         let count = self.powers_w.len() as f64;
         if let Some(cells) = self.cells {
             return if count > 0.0 { cells * count / (count + self.near_target) } else { cells };
         }
-        let ln_silent = self.silent as f64 * ln_below(threshold_w);
-        let ln_all: f64 = ln_silent + self.powers_w.iter().map(|y| ln_below(*y)).sum::<f64>();
+        let ln_silent = self.silent as f64 * cell.ln_below(threshold_w);
+        let ln_all: f64 = ln_silent + self.powers_w.iter().map(|y| cell.ln_below(*y)).sum::<f64>();
         (count / -ln_all.min(-f64::MIN_POSITIVE)).min(MOST_CELLS)
     }
 
@@ -118,14 +119,12 @@ impl Alarms {
             return 0.0;
         }
         let threshold_w = limits.threshold_w;
-        let law = GammaLaw::new(self.looks);
-        let ln_noise = receiver.noise_w.max(LEAST_NOISE * threshold_w).ln();
-        let ln_below = |power_w: f64| law.below(power_w.ln(), ln_noise).value;
-        let cells = self.cells(ln_below, threshold_w);
+        let cell = self.cell(receiver, limits);
+        let cells = self.cells(&cell, threshold_w);
         let mut sorted = self.powers_w.clone();
         sorted.sort_by(f64::total_cmp);
         // Probabilities of a higher power, which keep their digits in the tail.
-        let above = |power_w: f64| -(cells * ln_below(power_w)).exp_m1();
+        let above = |power_w: f64| -(cells * cell.ln_below(power_w)).exp_m1();
         let [all, beyond] = [threshold_w, MOST_OVER_THRESHOLD * threshold_w].map(above);
         let count = sorted.len() as f64;
         let mut largest = 0.0f64;
@@ -156,6 +155,24 @@ impl Alarms {
             return Some([OUTLYING_DB * share.sqrt(), 2.0 * off * off]);
         }
         (gain > UNLIKE).then_some([f64::from(best.abs()), gain])
+    }
+}
+
+/// The noise in one range cell.
+struct Cell {
+    law: GammaLaw,
+    ln_noise: f64,
+}
+
+impl Cell {
+    /// ln G.
+    fn ln_below(&self, power_w: f64) -> f64 {
+        self.law.below(power_w.ln(), self.ln_noise).value
+    }
+
+    /// ln g, per unit of ln power.
+    fn ln_density(&self, power_w: f64) -> f64 {
+        self.law.detected(power_w.ln(), self.ln_noise).value
     }
 }
 

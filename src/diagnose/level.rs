@@ -2,8 +2,8 @@
 //!
 //! The level is a constant factor on every echo. Data tell its product with the scale of each law, and neither alone. A law
 //! is therefore held near the scale that is stored: ln(1 + r²/2) is added to −ln p for a scale r deviations of
-//! [`SCALE_SD_DB`] away from it. Common to all laws, a change is the level's; that of one law among several has long
-//! tails, so that one wrong material does not draw the level along.
+//! [`SCALE_SD_DB`] away from it. Common to all laws, a change is the level's. The tails are long, so that one wrong law among
+//! three or more does not draw the level along; two that disagree leave two optima, and a search ends in one.
 
 use std::f64::consts::FRAC_PI_2;
 

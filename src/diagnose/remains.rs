@@ -25,7 +25,7 @@ pub(super) struct Remainder<'a> {
 /// Every structure that exceeds chance, strongest first.
 pub(super) fn find_unexplained(scorer: &Scorer, remainder: &Remainder) -> Vec<ResidualStructure> {
     let Remainder { prediction, z, structure, largest_db, off_target } = *remainder;
-    let Problem { shots, observations, declared, shared, .. } = scorer.problem;
+    let Problem { shots, observations, alarms, declared, shared, .. } = scorer.problem;
     let covariates = covariates(shots, prediction, observations);
     let tests = tests(scorer.settings, largest_db);
     let mut found = tests.run(z, shots, prediction, &covariates, scorer.folds);
@@ -36,7 +36,6 @@ pub(super) fn find_unexplained(scorer: &Scorer, remainder: &Remainder) -> Vec<Re
     if scorer.is_shared(&neighbours, largest_db) {
         found.push(neighbours);
     }
-    let Problem { alarms, .. } = scorer.problem;
     if let Some([strength_db, gain]) = alarms.unlike(&prediction.receiver, declared) {
         let p_value = (-gain).exp();
         let covariate = "false alarms".to_owned();

@@ -46,8 +46,8 @@ pub(super) fn share_of_spot(beyond_m: f64, diameter_m: f64) -> f64 {
 const ABOUT: About = About {
     name: "covering-layer",
     level: Level::Scene,
-    description: "Part of the target is covered, as by clothing, which the wave crosses twice: a loss that \
-         grows with the way through the layer, as 1/cos θ, on the far side of a straight line across \
+    description: "Part of the target is covered, as by clothing, which the wave crosses twice. The loss grows \
+         with the way through the layer, as 1/cos θ. The layer lies on the far side of a straight line across \
          the field of view, or within an oval. The line lies boundary_m from the field's centre, in a direction \
          counted from x_t towards y_t, and the layer lies beyond it. An oval takes its place where length_m and width_m are \
          given: half axes about its centre, the first turned from x_t towards y_t.",

@@ -26,8 +26,8 @@ const ABOUT: About = About {
     name: "fov-gain",
     level: Level::Instrument,
     description: "The antenna's gain is not the same over the field of view. With (u, v) for the place over 0.5 m it \
-         changes by edge_db·(u² + v²), in dB; beside that by slope_x_db·u + slope_y_db·v, where the pattern is off the \
-         centre, by oval_db·(u² − v²) + twist_db·2uv, where it is not round, and by steep_db·(u² + v²)².",
+         changes by edge_db·(u² + v²), in dB. A pattern off the centre adds slope_x_db·u + slope_y_db·v, one that is \
+         not round oval_db·(u² − v²) + twist_db·2uv, a steep one steep_db·(u² + v²)².",
     signature: "The residual grows or falls in rings about the centre of the field of view, whatever is \
          looked at. On a convex target that stands in the middle, angle and distance from the centre \
          rise together and the exponent of the diffuse lobe hides it: a second target off the centre \
