@@ -24,6 +24,8 @@ const UNLIKE: f64 = 12.0;
 /// Difference from their law from which false alarms are something else, and the size that each then stands for, dB.
 const OFF_THEIR_LAW: f64 = 2.3;
 const OUTLYING_DB: f64 = 10.0;
+/// Gain in ln likelihood by which false alarms tell a level of noise.
+const TOLD: f64 = 5.0;
 /// Levels of noise that are tried, dB over the model's.
 const LEVELS_DB: std::ops::RangeInclusive<i32> = -12..=12;
 
@@ -85,13 +87,17 @@ impl Alarms {
         near_target.saturating_sub(expected.round() as usize)
     }
 
-    /// Change of the data of these chirps by another level of noise, dB, as its part in the rms over `shots` others.
-    pub(super) fn size_db(&self, [before, after]: [&Receiver; 2], shots: usize) -> f64 {
-        let (alarms, all) = (self.powers_w.len() as f64, (self.powers_w.len() + shots) as f64);
+    /// Change of the data of these chirps by another level of noise, dB; none where they hardly tell it.
+    pub(super) fn size_db(&self, [before, after]: [&Receiver; 2], limits: ReceiverLimits) -> f64 {
         if before.noise_w <= 0.0 || after.noise_w <= 0.0 {
             return 0.0;
         }
-        DB * (after.noise_w / before.noise_w).ln().abs() * (alarms / all.max(1.0)).sqrt()
+        let [ln_before, ln_after] = [before, after].map(|receiver| self.ln_p(receiver, limits));
+        if ln_after - ln_before < TOLD {
+            0.0
+        } else {
+            DB * (after.noise_w / before.noise_w).ln().abs()
+        }
     }
 
     fn cell(&self, receiver: &Receiver, limits: ReceiverLimits) -> Cell {

@@ -181,11 +181,11 @@ impl Scorer<'_> {
 
     /// Change of the data by a model with more effects.
     pub fn size(&self, state: &State, space: &Space, at: &DVector<f64>) -> Size {
-        let Problem { observations, alarms, .. } = self.problem;
+        let Problem { observations, alarms, declared, .. } = self.problem;
         let [before, after] = [self.predict(state), self.problem.predict(space, at)];
         let size = Size::of(observations, &before, &after);
-        let of_alarms_db = alarms.size_db([&before.receiver, &after.receiver], observations.len());
-        Size { mean_db: size.mean_db.hypot(of_alarms_db), ..size }
+        let of_alarms_db = alarms.size_db([&before.receiver, &after.receiver], declared);
+        Size { mean_db: size.mean_db.max(of_alarms_db), ..size }
     }
 
     /// Randomised quantile residual of every shot.

@@ -27,6 +27,12 @@ const LEAST: f64 = 0.02;
 /// Mean correlation within half a spot from which on neighbours count as sharing at all. A missing effect that is as
 /// small as a spot leaves less.
 const SHARED: f64 = 0.1;
+/// Correlation of places that lie ever closer from which on it is one of speckle. Beams on one place share all of it, and
+/// a missing effect is a part of the scatter only.
+const AT_ONE_PLACE: f64 = 0.55;
+/// Widths of the correlation that are tried, in spots.
+const WIDTHS: std::ops::RangeInclusive<u32> = 2..=16;
+const WIDTH_STEP: f64 = 0.1;
 /// Largest residual that counts, in standard deviations: a small bright place is not speckle.
 const MOST: f64 = 2.5;
 
@@ -179,6 +185,14 @@ fn correlations(z: &[Option<f64>], neighbours: &Neighbours, lag_m: f64) -> Vec<f
     let detected = z.iter().flatten().count().max(1) as f64;
     let variance = z.iter().flatten().map(|z| z * z).sum::<f64>() / detected - beyond;
     let share = |mean: f64| ((mean - beyond) / variance.max(f64::MIN_POSITIVE)).min(1.0);
+    let measured: Vec<[f64; 3]> = (0..lags)
+        .filter_map(|lag| {
+            Some([(lag as f64 + 0.5) / PER_SPOT, share(mean(lag, lag + 1)?), counts[lag]])
+        })
+        .collect();
+    if at_one_place(&measured) < AT_ONE_PLACE {
+        return Vec::new();
+    }
     // Within half a spot, or where a coarse scan has its nearest neighbours.
     let nearest = (1..=PER_SPOT as usize).find_map(|end| mean(0, end));
     let near = mean(0, (0.5 * PER_SPOT) as usize).or(nearest);
@@ -191,6 +205,34 @@ fn correlations(z: &[Option<f64>], neighbours: &Neighbours, lag_m: f64) -> Vec<f
         .take_while(|share| share.is_none_or(|share| share >= LEAST))
         .map(|s| s.unwrap_or(0.0))
         .collect()
+}
+
+/// The correlation of places that lie ever closer, by a kernel a·exp(−2d²/w²) + b of the likeliest width. `measured`:
+/// distance in spots, correlation and number of pairs.
+fn at_one_place(measured: &[[f64; 3]]) -> f64 {
+    let mut best = (f64::INFINITY, 0.0);
+    for width in WIDTHS.map(|width| WIDTH_STEP * f64::from(width)) {
+        let kernel = |apart: f64| (-2.0 * (apart / width).powi(2)).exp();
+        // Least squares of a and b.
+        let mut sums = [0.0; 6];
+        for &[apart, share, pairs] in measured {
+            let k = kernel(apart);
+            let products = [1.0, k, k * k, share, k * share, share * share];
+            sums.iter_mut().zip(products).for_each(|(sum, product)| *sum += pairs * product);
+        }
+        let [n, k, kk, s, ks, ss] = sums;
+        let determinant = n * kk - k * k;
+        if determinant <= 1e-12 * n * kk {
+            continue;
+        }
+        let a = (n * ks - k * s) / determinant;
+        let b = (s - a * k) / n;
+        let left = ss - a * ks - b * s;
+        if left < best.0 {
+            best = (left, a);
+        }
+    }
+    best.1
 }
 
 #[cfg(test)]

@@ -204,11 +204,10 @@ impl<'a> Space<'a> {
         DVector::from_vec(start)
     }
 
-    /// A point with the scattering models back at their start.
+    /// A point with the scattering models and the level back at their start.
     pub fn restarted(&self, at: &DVector<f64>) -> DVector<f64> {
-        let (start, laws) = (self.start(), self.laws_len());
-        let others = at.iter().skip(laws);
-        DVector::from_vec(start.iter().take(laws).chain(others).copied().collect())
+        let others = at.iter().skip(self.base_len());
+        DVector::from_vec(self.start().iter().chain(others).copied().collect())
     }
 
     /// Two points about another that differ in one unknown. Scattering models are smooth, so that one of the

@@ -21,7 +21,7 @@ const SHARE_BESIDE_FIELD: f64 = 0.5;
 const MOST_SHARED: f64 = 0.6;
 /// Share of its gain that an effect of one small place keeps where it is held out.
 const SHARE_KEPT: f64 = 0.6;
-/// Gain of such an effect, in least gains.
+/// Gain of such an effect, in least gains, and any held-out gain in standard errors, that leaves no doubt.
 const FAR_BEYOND: f64 = 4.0;
 
 /// What speaks for an effect.
@@ -43,6 +43,12 @@ impl Claim {
     /// The smaller gain. A fit without a patch may be far off where only that patch held it.
     fn counts(&self) -> f64 {
         self.held_out[0].min(self.gain)
+    }
+
+    /// Whether held-out patches gain so much that larger errors of the powers do not speak against the effect: it explains
+    /// ranges or silence, and the powers by a form that is not quite its own.
+    fn is_far_beyond_errors(&self) -> bool {
+        self.counts() > FAR_BEYOND * self.held_out[1]
     }
 
     /// Whether fit, held-out patches and size support the effect, on a scan of this many independent shots.
@@ -100,7 +106,8 @@ impl<'j, 'p, 'a> Judge<'j, 'p, 'a> {
         claim.held_out = self.scorer.difference(&held_out, &self.state.held_out);
         trial.candidate.held_out = Some(claim.held_out);
         if !claim.is_supported(settings, shots)
-            || self.scorer.is_farther_off(&held_out, &self.state.held_out)
+            || (!claim.is_far_beyond_errors()
+                && self.scorer.is_farther_off(&held_out, &self.state.held_out))
             || (is_spread && self.is_structure_of_means(trial))
         {
             return None;

@@ -32,6 +32,8 @@ const SHARE_OF_START: f64 = 0.7;
 const SHARE_OF_WORD: f64 = 0.3;
 /// An effect that promises less than this share of the best is not fitted.
 const SHARE_TO_SCOUT: f64 = 0.05;
+/// Most parameters of an effect that is fitted whatever it promises, where a start is far from the fitted model.
+const MOST_NUMBERS_FAR: usize = 5;
 /// Effects of each round, with all members of their families, that are fitted to all shots and predict held-out patches.
 const SHORTLIST: usize = 5;
 /// An effect that gains less than this share of the best is not among them.
@@ -47,6 +49,8 @@ pub(super) struct Trial<'a> {
     pub effect: &'a dyn Effect,
     pub space: Space<'a>,
     starts: Vec<Start>,
+    /// Whether one of them is with the scattering models as declared, of which no promise tells anything.
+    has_far_start: bool,
     /// Number of starts before the choice of the best.
     pub tried: usize,
     pub fit: Fit,
@@ -124,7 +128,10 @@ impl<'p> Search<'p> {
     fn scout_promising(&self, state: &State, screen: &Screen, trials: &mut [Trial], round: usize) {
         let mut best = 0.25 * self.scorer.settings.least_gain_of(1, 1) / SHARE_TO_SCOUT;
         for trial in trials {
-            if trial.candidate.gain >= SHARE_TO_SCOUT * best {
+            let is_far_and_cheap = trial.has_far_start
+                && trial.candidate.numbers <= MOST_NUMBERS_FAR
+                && !trial.effect.moves();
+            if trial.candidate.gain >= SHARE_TO_SCOUT * best || is_far_and_cheap {
                 (self.notify)(&format!("round {round}: trying {}", trial.effect.name()));
                 self.scout(state, screen, trial);
                 best = best.max(trial.candidate.gain);
@@ -180,10 +187,12 @@ impl<'p> Search<'p> {
         // Without an effect that bends the whole curve, such as a ceiling, the scattering models may be far from those
         // that fit best with it.
         let is_first = state.space.effects.is_empty() && !is_absent;
+        let mut has_far_start = false;
         if (is_first || screen.leaves_laws_open)
             && let Some(at) = from_declared_laws(screen, state, &space, effect, &values)
         {
             // Followed whatever it promises: a promise is about a step from the fitted scattering models.
+            has_far_start = true;
             starts.push(Start { worth: starts.first().map_or(0.0, |start| start.worth), at });
         }
         let Start { worth, at } = starts.first()?.clone();
@@ -191,7 +200,7 @@ impl<'p> Search<'p> {
         let candidate = Candidate::sampled(round, effect.name(), effect.parameters().len(), gain);
         let fit = Fit { at, ln_likelihood: f64::NEG_INFINITY, converged: false, is_stuck: false };
         let (tried, size) = (values.len(), Size::default());
-        Some(Trial { effect, space, starts, tried, fit, size, candidate })
+        Some(Trial { effect, space, starts, has_far_start, tried, fit, size, candidate })
     }
 
     /// The starts of different shapes that promise most, best first.
@@ -230,15 +239,9 @@ impl<'p> Search<'p> {
         if start.worth > 0.0 {
             climb(effect, start, SHAPE_STEPS.len(), |at| weight * screen.promise(space, at));
         }
-        let Some(known) = effect.parameters().first() else { return };
-        let first = start.at.len() - effect.parameters().len();
         let gain = |at: &DVector<f64>| weight * screen.gain(space, at);
-        let mut strengths = STRENGTHS.map(|scale| {
-            let mut at = start.at.clone();
-            let value = known.absent + scale * (start.at[first] * known.step - known.absent);
-            at[first] = value.clamp(known.min, known.max) / known.step;
-            Start { worth: gain(&at), at }
-        });
+        let mut strengths =
+            of_all_strengths(effect, &start.at).map(|at| Start { worth: gain(&at), at });
         strengths.sort_by(|a, b| b.worth.total_cmp(&a.worth));
         // Far from the data a promise may be due to other effects, and no strength keeps it.
         if strengths[0].worth < SHARE_OF_WORD * start.worth {
@@ -366,7 +369,7 @@ fn is_at_rest(fit: &Fit, effect: &dyn Effect) -> bool {
     fit.is_stuck && !effect.moves()
 }
 
-/// The best start with the scattering models as the scene declares them.
+/// The best start of any strength with the scattering models as the scene declares them.
 fn from_declared_laws(
     screen: &Screen,
     state: &State,
@@ -377,7 +380,22 @@ fn from_declared_laws(
     let declared = state.space.restarted(&state.fit.at);
     let starts = values.iter().map(|values| Space::joined(&declared, effect, values));
     let gains = starts.map(|start| (screen.gain(space, &start), start));
-    gains.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, start)| start)
+    let (_, best) = gains.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let stronger = of_all_strengths(effect, &best).map(|at| (screen.gain(space, &at), at));
+    stronger.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, at)| at)
+}
+
+/// A start with its effect in each of [`STRENGTHS`].
+fn of_all_strengths(effect: &dyn Effect, start: &DVector<f64>) -> [DVector<f64>; STRENGTHS.len()] {
+    let first = start.len() - effect.parameters().len();
+    STRENGTHS.map(|scale| {
+        let mut at = start.clone();
+        if let Some(known) = effect.parameters().first() {
+            let value = known.absent + scale * (start[first] * known.step - known.absent);
+            at[first] = value.clamp(known.min, known.max) / known.step;
+        }
+        at
+    })
 }
 
 /// Sorts trials by their gain, best first.
