@@ -70,12 +70,12 @@ def trace(scene, order, origins, directions, evaluate):
     n = len(directions)
     out = dict(range=np.zeros(n), normal=np.zeros((n, 3)), piece=np.full(n, -1), facet=np.full(n, -1), fcos=np.zeros(n))
     context = mi.BSDFContext()
-    for i, (o, d) in enumerate(zip(np.broadcast_to(origins, (n, 3)), directions)):
-        si = scene.ray_intersect(mi.Ray3f(list(o), list(d)))
+    for i, (o, d) in enumerate(zip(np.broadcast_to(origins, (n, 3)).tolist(), directions.tolist())):
+        si = scene.ray_intersect(mi.Ray3f(o, d))
         if not si.is_valid():
             continue
-        normal = np.array(si.n)
-        out["normal"][i] = normal if normal @ d < 0 else -normal
+        normal = si.n
+        out["normal"][i] = normal.x, normal.y, normal.z
         out["range"][i] = si.t
         out["piece"][i] = order[si.shape.id()]
         out["facet"][i] = si.prim_index
@@ -83,6 +83,7 @@ def trace(scene, order, origins, directions, evaluate):
             if np.array(si.wi)[2] < 0:
                 si.wi = -si.wi
             out["fcos"][i] = si.bsdf().eval(context, si, si.wi)[0]
+    out["normal"] *= np.where(np.sum(out["normal"] * directions, 1) < 0, 1.0, -1.0)[:, None]
     return out
 
 

@@ -4,7 +4,6 @@
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.ndimage import gaussian_filter
 from scipy.special import polygamma
 
 import physics
@@ -62,22 +61,44 @@ def drift(s, size, rng):
     s.gain = s.gain * physics.mw(size * path)
 
 
-def finite_spot(s, size, rng):
-    """A footprint `size` cm wide (two-way sd), longer in one direction, and a weak wide foot."""
-    power = s.grid_means_mw()
-    sd, longer = size * 0.01 / 0.005, rng.uniform(1.0, 1.4)
-    wide = 0.93 * gaussian_filter(power, (sd * longer, sd)) + 0.07 * gaussian_filter(power, 2.5 * sd)
-    there = s.lookup(power, s.aim, 1)
-    exact = s.means_mw()[0]  # the raster gives the ratio, Mitsuba's own rays the power
-    ratio = s.lookup(wide, s.aim, 1) / np.maximum(there, 1e-30)
-    s.spread = np.where(exact > 0, exact * np.where(there > 0, ratio, 1.0), s.lookup(wide, s.aim, 1))
-    nearest = s.range_m <= 0
-    if nearest.any() and (~nearest).any():
-        from scipy.spatial import cKDTree
-        hit = np.flatnonzero(~nearest)
-        _, index = cKDTree(s.aim[hit]).query(s.aim[nearest])
-        s.range_m[nearest], s.piece[nearest] = s.range_m[hit[index]], s.piece[hit[index]]
-        s.normal[nearest] = s.normal[hit[index]]
+def footprint(count, size, longer, turn, inner=0.6):
+    """Points, m, and weights of the two-way spot: an ellipse (sd `size` cm across it, `longer` times that along it)
+    with 0.93 of the power, and a round foot 2.5 times as wide. A spiral of the golden angle, dense in both."""
+    share = (np.arange(count) + 0.5) / count
+    radius = np.linspace(0, 20, 20001)
+    tail = inner * np.exp(-radius**2 / 2) + (1 - inner) * np.exp(-radius**2 / 12.5)
+    r, phi = np.interp(share, 1 - tail, radius), np.pi * (3 - np.sqrt(5)) * np.arange(count)
+    x, y = longer * r * np.cos(phi), r * np.sin(phi)
+    drawn = inner * np.exp(-r**2 / 2) + (1 - inner) * np.exp(-r**2 / 12.5) / 6.25
+    weight = 0.93 / longer * np.exp(-r**2 / 2) + 0.07 / 6.25 * np.exp(-(x**2 + y**2) / 12.5)
+    c, s = np.cos(turn), np.sin(turn)
+    return 0.01 * size * np.stack([c * x - s * y, s * x + c * y], -1), weight / drawn / np.sum(weight / drawn)
+
+
+def finite_spot(s, size, rng, count=96, levels=(1,4,16), inner=0.6, thr=0.1):
+    """A footprint `size` cm wide (two-way sd), longer in one direction, and a weak wide foot.
+
+    `count` sub-rays for each chirp, and `more` times as many where two halves of them differ by 0.1 dB: at edges."""
+    longer, turn = rng.uniform(1.0, 1.4), rng.uniform(0, np.pi)
+    power, share, range_m = np.zeros(s.n), np.zeros(s.n), np.zeros(s.n)
+    left = np.arange(0, s.n, 3 if s.draft else 1)
+    for n in (count,) if s.draft else [count * l for l in levels]:
+        points, weight = footprint(n, size, longer, turn, inner)
+        apart = []
+        for block in np.array_split(left, 1 + len(left) * n // 100_000):
+            lobe, rest, hits = s.sub_rays(block, points, weight)
+            each = lobe + rest
+            power[block] = each.sum(1)
+            safe = np.maximum(power[block], 1e-30)
+            share[block], range_m[block] = lobe.sum(1) / safe, np.sum(each * hits["range"], 1) / safe
+            best, rows = np.argmax(each, 1), np.arange(len(block))
+            new = s.range_m[block] <= 0
+            s.piece[block[new]], s.normal[block[new]] = hits["piece"][rows, best][new], hits["normal"][rows, best][new]
+            part = np.stack([each[:, k::4].sum(1) / weight[k::4].sum() for k in range(4)])
+            error = 4.34 * part.std(0) / np.maximum(part.mean(0), 1e-30)
+            apart.append((error > thr) & (power[block] > physics.mw(physics.THRESHOLD_DBM - 15)))
+        left = left[np.concatenate(apart)]
+    s.range_m, s.spread, s.spread_share = range_m, power, share
 
 
 def foreign_patch(s, size, rng):

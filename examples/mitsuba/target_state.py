@@ -1,7 +1,6 @@
 """What a scan meets: geometry of every chirp and its mean power, which an effect may change."""
 
 import numpy as np
-from scipy.ndimage import map_coordinates
 from scipy.spatial.transform import Rotation
 
 import physics
@@ -24,7 +23,8 @@ class State:
         self.slope_scale = np.ones(self.n)  # what multiplies the slope at which the lobe is looked up
         self.lobe_gain, self.rest_gain, self.gain = np.ones(self.n), np.ones(self.n), np.ones(self.n)
         self.added_mw = np.zeros(self.n)
-        self.spread = None  # a map that replaces the mean power
+        self.spread, self.spread_share = None, None  # what replaces the mean power and the share of the lobe
+        self.draft = False  # while a size is sought, an effect may do with fewer chirps and leave the others silent
         self.ceiling_mw, self.noise_gain, self.looks = None, 1.0, None
         self.tilt = np.zeros(self.n)
         self.grid_x, self.grid_y = scan.grid()
@@ -66,13 +66,8 @@ class State:
         total = np.where(hit, lobe + rest + self.added_mw, 0.0)
         share = lobe / (lobe + rest + self.added_mw)
         if self.spread is not None:
-            total = self.spread * np.where(hit, self.gain, 1.0)
+            total, share = np.where(hit, self.spread * self.gain, 0.0), self.spread_share
         return total, share
-
-    def lookup(self, values, at, order):
-        row = (at[:, 1] - self.grid_y[0]) / (self.grid_y[1] - self.grid_y[0])
-        column = (at[:, 0] - self.grid_x[0]) / (self.grid_x[1] - self.grid_x[0])
-        return map_coordinates(values, [row, column], order=order, mode="nearest")
 
     def move(self, shift, turn):
         """The target moves: for each chirp a shift, m, and a turn about the centre as a rotation vector, rad.
@@ -91,12 +86,19 @@ class State:
         self.range_m, self.piece = hits["range"], hits["piece"]
         self.normal = back.inv().apply(hits["normal"])
 
-    def grid_means_mw(self):
-        """Mean echo on the raster, before any effect."""
-        x, y = np.meshgrid(self.grid_x, self.grid_y)
-        ray = scan.directions(np.stack([x.ravel(), y.ravel()], -1))
-        hit = self.grid_range.ravel() > 0
-        safe = np.where(hit, self.grid_range.ravel(), 8.0)
-        theta = np.where(hit, np.arccos(np.clip(-np.sum(self.grid_normal.reshape(-1, 3) * ray, 1), 0.01, 1)), 0)
-        lobe, rest = self.parts_mw(theta, safe)
-        return np.where(hit, lobe + rest, 0.0).reshape(self.grid_range.shape)
+    def sub_rays(self, chirps, points, weight):
+        """Weighted powers of the lobe and of the rest, mW, of rays through points around the aims at the target plane.
+
+        Mitsuba traces them. Each has its own range, normal and law, as the single ray of a chirp has; what misses
+        brings nothing. Returns lobe and rest, one row a chirp, and the hits."""
+        import build_bases
+
+        at = (self.aim[chirps, None, :] + points).reshape(-1, 2)
+        ray = scan.directions(at)
+        hits = build_bases.trace(*build_bases.load(self.name), scan.ORIGIN, ray, False)
+        hit = hits["range"] > 0
+        theta = np.where(hit, np.arccos(np.clip(-np.sum(hits["normal"] * ray, 1), 0.01, 1)), 0.0)
+        shape = (len(chirps), len(points))
+        lobe, rest = (np.where(hit, p, 0.0).reshape(shape) * weight
+                      for p in self.parts_mw(theta, np.where(hit, hits["range"], physics.FOCUS_M)))
+        return lobe, rest, {k: v.reshape(shape + v.shape[1:]) for k, v in hits.items()}

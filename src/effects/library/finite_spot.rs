@@ -1,5 +1,8 @@
 //! A spot of finite size: the power of a chirp is the mean over rays through a Gaussian footprint, its
 //! range their mean by power. Rays that miss the target bring nothing.
+//!
+//! The rays stand on a spiral whose radii grow by the same factor from each to the next, so that some lie in a spot of any
+//! diameter. They are traced once, and a diameter only weighs them.
 
 use std::sync::{Arc, LazyLock};
 
@@ -18,12 +21,14 @@ use crate::trace::{Hit, closest};
 
 pub(crate) struct FiniteSpot;
 
-/// Rays that stand for a spot. On a ball a highlight may be a tenth of it.
-const RAYS: usize = 64;
-/// The widest spot, m.
+/// Rays that stand for spots of all diameters. On a ball a highlight may be a tenth of a spot.
+const RAYS: usize = 160;
+/// Radii of the first and of the last ray, m.
+const RADII_M: [f64; 2] = [2.5e-4, 0.18];
+/// The widest spot, m. The last ray is three standard deviations of its two-way weight from its middle.
 const MOST_M: f64 = 0.2;
-/// How far they reach, in standard deviations of the two-way weight.
-const REACH_SD: f64 = 3.0;
+/// Least weight of a ray that counts, as a share of the largest.
+const LEAST_WEIGHT: f64 = 1e-4;
 /// Largest factor, and one over it the smallest, by which other effects may change the power of a shot.
 /// Beyond it they have moved the shot to another surface, and the spot keeps the power of the old one.
 const MOST_GAIN: f64 = 100.0;
@@ -36,9 +41,11 @@ const MOST_TERMS: usize = 48;
 struct SpotRay {
     range_m: f64,
     to_radar: Direction<Surface>,
-    /// Power, W, where f is 1/sr, by its share of the spot.
+    /// Power, W, where f is 1/sr and all of the spot is like here.
     watts_per_f: f64,
     region: u16,
+    /// Its number on the spiral.
+    number: u8,
     /// How far the beam that sees it widens its lobes, rad.
     beam_rad: f64,
 }
@@ -49,14 +56,14 @@ impl SpotRay {
         beam: &GaussianBeam,
         surface: HitSurface,
         hit: &Hit,
-        share: f64,
+        number: u8,
     ) -> SpotRay {
         let HitSurface { region, to_radar, .. } = surface;
         let Hit { range_m, cos_theta, .. } = *hit;
-        let watts_per_f = share * stage.link.power_w(beam, range_m, cos_theta, 1.0);
+        let watts_per_f = stage.link.power_w(beam, range_m, cos_theta, 1.0);
         // The rays stand on the wavefront, whose curvature is the rest of the divergence.
         let beam_rad = stage.widening_rad(region, beam.section(range_m).divergence_rad());
-        SpotRay { range_m, to_radar, watts_per_f, region, beam_rad }
+        SpotRay { range_m, to_radar, watts_per_f, region, number, beam_rad }
     }
 
     /// Its power, W, from one region with an f of a beam's divergence, rad, and a direction, 1/sr.
@@ -71,8 +78,16 @@ type Spot = (SpotRay, Vec<SpotRay>);
 /// The spots of all shots.
 struct Spots {
     all: Vec<Option<Spot>>,
-    /// Their answers to terms of level 1: a law's levels change more often than its shape.
-    sums: Cache<(u16, Term), Vec<Sums>, MOST_TERMS>,
+    /// Their answers to terms of level 1, for a diameter in bits: a law's levels change more often than its shape.
+    sums: Cache<(u16, Term, u64), Vec<Sums>, MOST_TERMS>,
+}
+
+/// Spots with the laws of their regions.
+struct ShadedSpots {
+    spots: Arc<Spots>,
+    laws: Vec<Brdf>,
+    /// Answers to laws that are no sums of terms, by region and diameter.
+    sums: Cache<(u16, u64), Vec<Sums>>,
 }
 
 /// What a spot sends back from one region by one term of its law.
@@ -87,11 +102,21 @@ struct Sums {
 }
 
 impl Sums {
-    /// Of a region's rays, for f of a beam's divergence, rad, and a direction, 1/sr.
-    fn of((centre, spot): &Spot, region: u16, f: impl Fn(f64, Direction<Surface>) -> f64) -> Sums {
+    /// Of a region's rays by their weights, for f of a beam's divergence, rad, and a direction, 1/sr.
+    fn of(
+        (centre, spot): &Spot,
+        weights: &[f64; RAYS],
+        region: u16,
+        f: impl Fn(f64, Direction<Surface>) -> f64,
+    ) -> Sums {
         let mut sums = Sums { centre_w: centre.power_w(region, &f), ..Sums::default() };
         for ray in spot {
-            let (power_w, longer_m) = (ray.power_w(region, &f), ray.range_m - centre.range_m);
+            let weight = weights[usize::from(ray.number)];
+            if weight == 0.0 {
+                continue;
+            }
+            let (power_w, longer_m) =
+                (weight * ray.power_w(region, &f), ray.range_m - centre.range_m);
             sums.power_w += power_w;
             sums.first += power_w * longer_m;
             sums.second += power_w * longer_m * longer_m;
@@ -121,21 +146,25 @@ impl Sums {
     }
 }
 
-impl Spots {
-    /// The level, 1/sr, of each term of the laws and how the spots answer to it. A law that is no sum of terms
-    /// is one of level 1.
-    fn answers(&self, laws: &[Brdf]) -> Vec<(f64, Arc<Vec<Sums>>)> {
+impl ShadedSpots {
+    /// The level, 1/sr, of each term of the laws and how spots of a diameter, m, answer to it. A law that is no sum of
+    /// terms is one of level 1.
+    fn answers(&self, diameter_m: f64) -> Vec<(f64, Arc<Vec<Sums>>)> {
+        let (weights, bits) = (&weights(diameter_m), diameter_m.to_bits());
         let mut answers = Vec::new();
-        for (region, law) in (0..).zip(laws) {
+        for (region, law) in (0..).zip(&self.laws) {
             let Some(terms) = law.backscatter() else {
-                let sums = self.sums(region, |beam_rad, v| law.seen_by(beam_rad, v, v).f_per_sr);
-                answers.push((1.0, Arc::new(sums)));
+                let sums = self.sums.get_or_make((region, bits), || {
+                    let f = |beam_rad, v| law.seen_by(beam_rad, v, v).f_per_sr;
+                    self.spots.sums(weights, region, f)
+                });
+                answers.push((1.0, sums));
                 continue;
             };
             for term in terms {
                 let shape = Term { level_per_sr: 1.0, ..term };
-                let sums = self.sums.get_or_make((region, shape), || {
-                    self.sums(region, |beam_rad, v| {
+                let sums = self.spots.sums.get_or_make((region, shape, bits), || {
+                    self.spots.sums(weights, region, |beam_rad, v| {
                         shape.per_sr(Look { beam_rad, cos_theta: v.cos_theta() })
                     })
                 });
@@ -144,24 +173,33 @@ impl Spots {
         }
         answers
     }
+}
 
+impl Spots {
     /// The sums of every spot over the rays of a region, for f of a beam's divergence, rad, and a direction, 1/sr.
-    fn sums(&self, region: u16, f: impl Fn(f64, Direction<Surface>) -> f64 + Sync) -> Vec<Sums> {
+    fn sums(
+        &self,
+        weights: &[f64; RAYS],
+        region: u16,
+        f: impl Fn(f64, Direction<Surface>) -> f64 + Sync,
+    ) -> Vec<Sums> {
         let spots = self.all.par_iter();
         spots
-            .map(|spot| spot.as_ref().map_or(Sums::default(), |spot| Sums::of(spot, region, &f)))
+            .map(|spot| {
+                spot.as_ref().map_or(Sums::default(), |spot| Sums::of(spot, weights, region, &f))
+            })
             .collect()
     }
 }
 
-/// The spots of all shots, each of a diameter on the target, m.
-fn spots(stage: &Stage, shots: &[Shot], diameter_m: f64) -> Vec<Option<Spot>> {
+/// The spots of all shots.
+fn spots(stage: &Stage, shots: &[Shot]) -> Vec<Option<Spot>> {
     let axes: Vec<Ray<Global>> = shots.iter().map(|shot| shot.ray).collect();
     let centres = closest(stage.geometry.bvh, &axes);
     let beams: Vec<GaussianBeam> = shots.iter().map(|shot| stage.beam(shot)).collect();
     let rays: Vec<[Ray<Global>; RAYS]> = (&axes, &beams, &centres)
         .into_par_iter()
-        .map(|(axis, beam, centre)| spot_rays(beam, axis, centre.as_ref(), diameter_m))
+        .map(|(axis, beam, centre)| spot_rays(beam, axis, centre.as_ref()))
         .collect();
     let hits = closest(stage.geometry.bvh, rays.as_flattened());
     // Where facets are few, spots hit most of them many times.
@@ -173,81 +211,73 @@ fn spots(stage: &Stage, shots: &[Shot], diameter_m: f64) -> Vec<Option<Spot>> {
         .into_par_iter()
         .zip(hits.par_chunks(RAYS))
         .map(|((axis, beam, centre, rays), hits)| {
-            let centre = spot_ray(stage, &facets, beam, axis, centre, 1.0)?;
+            let centre = spot_ray(stage, &facets, beam, axis, centre, 0)?;
             let beam_rad = stage.widening_rad(centre.region, beam.divergence_rad());
             let centre = SpotRay { beam_rad, ..centre };
             let mut spot = Vec::with_capacity(RAYS);
-            for ((ray, hit), place) in rays.iter().zip(hits).zip(PLACES.iter()) {
-                spot.extend(spot_ray(stage, &facets, beam, ray, hit, place.share));
+            for ((ray, hit), number) in rays.iter().zip(hits).zip(0..) {
+                spot.extend(spot_ray(stage, &facets, beam, ray, hit, number));
             }
+            spot.shrink_to_fit();
             Some((centre, spot))
         })
         .collect()
 }
 
-/// One ray of the spot of a beam with its share of the power, where it hits; `facets` may be empty.
+/// One ray of the spot of a beam, where it hits; `facets` may be empty.
 fn spot_ray(
     stage: &Stage,
     facets: &[Facet],
     beam: &GaussianBeam,
     ray: &Ray<Global>,
     hit: &Option<Hit>,
-    share: f64,
+    number: u8,
 ) -> Option<SpotRay> {
     let hit = hit.as_ref()?;
     let surface = match facets.get(hit.facet as usize) {
         Some(facet) => facet.surface(ray),
         None => surface_at(stage, ray, hit),
     };
-    Some(SpotRay::new(stage, beam, surface, hit, share))
+    Some(SpotRay::new(stage, beam, surface, hit, number))
 }
 
-/// The rays of a spot of a diameter, m, on the wavefront of the radar's own beam; where the axis hits
-/// nothing, all run along it.
-fn spot_rays(
-    beam: &GaussianBeam,
-    axis: &Ray<Global>,
-    centre: Option<&Hit>,
-    diameter_m: f64,
-) -> [Ray<Global>; RAYS] {
+/// The rays of a spot, on the wavefront of the radar's own beam; where the axis hits nothing, all run along it.
+fn spot_rays(beam: &GaussianBeam, axis: &Ray<Global>, centre: Option<&Hit>) -> [Ray<Global>; RAYS] {
     let Some(centre) = centre else { return [*axis; RAYS] };
     let section = beam.section(centre.range_m);
     let (u, v) = axis.direction.xyz().any_orthonormal_pair();
-    PLACES.map(|Place { along, across, .. }| {
-        let aside_m = diameter_m * (along * u + across * v);
-        section.ray(axis, aside_m).unwrap_or(*axis)
-    })
+    PLACES.map(|[along_m, across_m]| section.ray(axis, along_m * u + across_m * v).unwrap_or(*axis))
 }
 
-/// Where a ray of a spot passes, in diameters from its middle, and its share of the power.
-#[derive(Clone, Copy, Default)]
-struct Place {
-    along: f64,
-    across: f64,
-    share: f64,
-}
-
-/// The rays of a spot: evenly on a disc and weighted by the two-way weight u², as a highlight two spots
-/// away may outshine what lies in the middle.
-static PLACES: LazyLock<[Place; RAYS]> = LazyLock::new(|| {
-    // u² = exp(−8 ln 2·r²/D²) has this standard deviation along each direction.
-    let sd = 1.0 / (16.0 * std::f64::consts::LN_2).sqrt();
-    let mut places = sunflower(RAYS).map(|(area, angle_rad)| {
-        let off_sd = REACH_SD * area.sqrt();
-        let (along, across) = (sd * off_sd * angle_rad.cos(), sd * off_sd * angle_rad.sin());
-        Place { along, across, share: (-0.5 * off_sd * off_sd).exp() }
-    });
-    let places = [(); RAYS].map(|()| places.next().unwrap_or_default());
-    let sum: f64 = places.iter().map(|place| place.share).sum();
-    let squares = places.iter().map(|p| p.share * (p.along.powi(2) + p.across.powi(2)));
-    // The weight beyond their reach is made up for in the width.
-    let wider = (2.0 * sd * sd * sum / squares.sum::<f64>()).sqrt();
-    places.map(|Place { along, across, share }| Place {
-        along: wider * along,
-        across: wider * across,
-        share: share / sum,
+/// Where the rays of a spot pass, from its middle, m: at golden angles from each other.
+static PLACES: LazyLock<[[f64; 2]; RAYS]> = LazyLock::new(|| {
+    let mut angles_rad = sunflower(RAYS).map(|(_, angle_rad)| angle_rad);
+    std::array::from_fn(|number| {
+        let angle_rad = angles_rad.next().unwrap_or_default();
+        [angle_rad.cos(), angle_rad.sin()].map(|side| radius_m(number) * side)
     })
 });
+
+/// Distance of a ray from the middle of its spot, m.
+fn radius_m(number: usize) -> f64 {
+    let [first_m, last_m] = RADII_M;
+    first_m * (last_m / first_m).powf(number as f64 / (RAYS - 1) as f64)
+}
+
+/// Share of each ray in a spot of a diameter, m: the two-way weight u² = exp(−8 ln 2·r²/D²) of a ring whose width is in
+/// proportion to its radius.
+fn weights(diameter_m: f64) -> [f64; RAYS] {
+    // u² has this standard deviation along each direction.
+    let sd_m = diameter_m / (16.0 * std::f64::consts::LN_2).sqrt();
+    let mut weights: [f64; RAYS] = std::array::from_fn(|number| {
+        let off_sd = radius_m(number) / sd_m;
+        off_sd * off_sd * (-0.5 * off_sd * off_sd).exp()
+    });
+    let largest = weights.iter().copied().fold(0.0, f64::max);
+    weights.iter_mut().filter(|weight| **weight < LEAST_WEIGHT * largest).for_each(|w| *w = 0.0);
+    let sum: f64 = weights.iter().sum();
+    weights.map(|weight| weight / sum)
+}
 
 /// The mean over a spot by the base law, on the target as the scene has it: other effects act on top of
 /// it.
@@ -292,32 +322,27 @@ impl Effect for FiniteSpot {
     }
 
     fn survey_key(&self, values: &[f64]) -> Option<Vec<f64>> {
-        values.first().filter(|diameter_m| **diameter_m > 0.0).map(|_| values.to_vec())
+        values.first().filter(|diameter_m| **diameter_m > 0.0).map(|_| Vec::new())
     }
 
-    fn survey(&self, values: &[f64], stage: &Stage, shots: &[Shot]) -> Survey {
-        let diameter_m = values.first().copied().unwrap_or(0.0);
-        Box::new(Spots { all: spots(stage, shots, diameter_m), sums: Cache::default() })
+    fn survey(&self, _: &[f64], stage: &Stage, shots: &[Shot]) -> Survey {
+        Box::new(Arc::new(Spots { all: spots(stage, shots), sums: Cache::default() }))
     }
 
     fn shade(&self, survey: &Survey, laws: &[Brdf]) -> Survey {
-        let Some(spots) = survey.downcast_ref::<Spots>() else { return Box::new(()) };
-        let answers = spots.answers(laws);
-        let shots = (0..spots.all.len()).into_par_iter();
-        let means = shots.map(|shot| {
-            let mut sums = Sums::default();
-            for (level, of) in &answers {
-                sums = sums.and(*level, &of[shot]);
-            }
-            sums.averaged()
-        });
-        Box::new(means.collect::<Vec<_>>())
+        let Some(spots) = survey.downcast_ref::<Arc<Spots>>() else { return Box::new(()) };
+        let (spots, laws) = (spots.clone(), laws.to_vec());
+        Box::new(ShadedSpots { spots, laws, sums: Cache::default() })
     }
 
-    fn arrive(&self, _: &[f64], shaded: &Survey, arrived: &mut [Option<MeanEcho>]) {
-        let all = shaded.downcast_ref::<Vec<Option<SpotMean>>>().into_iter().flatten();
-        for (averaged, one) in all.zip(arrived) {
-            if let (Some(one), Some(averaged)) = (one, averaged) {
+    fn arrive(&self, values: &[f64], shaded: &Survey, arrived: &mut [Option<MeanEcho>]) {
+        let shaded = shaded.downcast_ref::<ShadedSpots>();
+        let Some((shaded, diameter_m)) = shaded.zip(values.first()) else { return };
+        let answers = shaded.answers(*diameter_m);
+        for (shot, one) in arrived.iter_mut().enumerate() {
+            let sums = answers.iter().filter_map(|(level, of)| Some((*level, of.get(shot)?)));
+            let sums = sums.fold(Sums::default(), |sums, (level, of)| sums.and(level, of));
+            if let (Some(one), Some(averaged)) = (one, sums.averaged()) {
                 let gain = one.power_w / averaged.centre_w;
                 one.power_w = averaged.mean_w * gain.clamp(1.0 / MOST_GAIN, MOST_GAIN);
                 one.range_m += averaged.longer_m;
@@ -353,18 +378,21 @@ mod tests {
             to_radar: Direction::from_angles(theta_rad, 0.3),
             watts_per_f: 1e-9,
             region,
+            number: (100.0 * theta_rad) as u8,
             beam_rad: 0.3 * theta_rad,
         };
         let over_a_border = (ray(0, 0.1), vec![ray(0, 0.2), ray(1, 0.3), ray(1, 0.05)]);
         let all = vec![Some(over_a_border), None, Some((ray(1, 0.2), vec![ray(1, 0.25)]))];
-        let spots = Spots { all: all.clone(), sums: Cache::default() };
+        let spots = Arc::new(Spots { all: all.clone(), sums: Cache::default() });
         let law = |f_lambda: f64, m: f64| paint(CookTorrance { f_lambda, m, ..lobe() });
         let tabled = Brdf::Lambert(Lambert { albedo: 0.5 });
         let first = [law(0.2, 0.2), law(0.1, 0.3)];
         let other_level = [law(0.4, 0.2), law(0.1, 0.3)];
         let other_shape = [law(0.2, 0.25), tabled];
         for laws in [&first, &other_level, &other_shape, &first] {
-            let answers = spots.answers(laws);
+            let survey: Survey = Box::new(spots.clone());
+            let shaded = FiniteSpot.shade(&survey, laws);
+            let answers = shaded.downcast_ref::<ShadedSpots>().unwrap().answers(0.02);
             for (shot, spot) in all.iter().enumerate() {
                 let add =
                     |sums: Sums, (level, of): &(f64, Arc<Vec<Sums>>)| sums.and(*level, &of[shot]);
@@ -376,7 +404,9 @@ mod tests {
                 let fresh = (0..).zip(laws).fold(Sums::default(), |sums, (region, law)| {
                     sums.and(
                         1.0,
-                        &Sums::of(spot, region, |beam_rad, v| law.seen_by(beam_rad, v, v).f_per_sr),
+                        &Sums::of(spot, &weights(0.02), region, |beam_rad, v| {
+                            law.seen_by(beam_rad, v, v).f_per_sr
+                        }),
                     )
                 });
                 for (kept, fresh) in [
