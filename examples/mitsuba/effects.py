@@ -61,44 +61,58 @@ def drift(s, size, rng):
     s.gain = s.gain * physics.mw(size * path)
 
 
-def footprint(count, size, longer, turn, inner=0.6):
+def footprint(count, size, longer, turn):
     """Points, m, and weights of the two-way spot: an ellipse (sd `size` cm across it, `longer` times that along it)
     with 0.93 of the power, and a round foot 2.5 times as wide. A spiral of the golden angle, dense in both."""
-    share = (np.arange(count) + 0.5) / count
+    share, inner = (np.arange(count) + 0.5) / count, 0.4  # of the points, more lie far out than of the power
     radius = np.linspace(0, 20, 20001)
-    tail = inner * np.exp(-radius**2 / 2) + (1 - inner) * np.exp(-radius**2 / 12.5)
-    r, phi = np.interp(share, 1 - tail, radius), np.pi * (3 - np.sqrt(5)) * np.arange(count)
+    reached = 1 - inner * np.exp(-(radius**2) / 2) - (1 - inner) * np.exp(-(radius**2) / 12.5)
+    r, phi = np.interp(share, reached, radius), np.pi * (3 - np.sqrt(5)) * np.arange(count)
     x, y = longer * r * np.cos(phi), r * np.sin(phi)
-    drawn = inner * np.exp(-r**2 / 2) + (1 - inner) * np.exp(-r**2 / 12.5) / 6.25
-    weight = 0.93 / longer * np.exp(-r**2 / 2) + 0.07 / 6.25 * np.exp(-(x**2 + y**2) / 12.5)
+    drawn = inner * np.exp(-(r**2) / 2) + (1 - inner) / 6.25 * np.exp(-(r**2) / 12.5)
+    weight = (0.93 / longer * np.exp(-(r**2) / 2) + 0.07 / 6.25 * np.exp(-(x**2 + y**2) / 12.5)) / drawn
     c, s = np.cos(turn), np.sin(turn)
-    return 0.01 * size * np.stack([c * x - s * y, s * x + c * y], -1), weight / drawn / np.sum(weight / drawn)
+    return 0.01 * size * np.stack([c * x - s * y, s * x + c * y], -1), weight / weight.sum()
 
 
-def finite_spot(s, size, rng, count=96, levels=(1,4,16), inner=0.6, thr=0.1):
+TRACED = {}  # what finite_spot has traced for all chirps
+
+
+def finite_spot(s, size, rng, count=96):
     """A footprint `size` cm wide (two-way sd), longer in one direction, and a weak wide foot.
 
-    `count` sub-rays for each chirp, and `more` times as many where two halves of them differ by 0.1 dB: at edges."""
+    `count` sub-rays for each chirp; 4 and then 16 times as many where four parts of them differ: at edges."""
     longer, turn = rng.uniform(1.0, 1.4), rng.uniform(0, np.pi)
+    key = (s.name, s.w0, size, longer, turn, count)
+    if s.draft:
+        traced = spread(s, size, longer, turn, np.arange(0, s.n, 3), (count,))
+    else:
+        if key not in TRACED:
+            TRACED[key] = spread(s, size, longer, turn, np.arange(s.n), (count, 4 * count, 16 * count))
+        traced = TRACED[key]
+    s.spread, s.spread_share, s.range_m, s.piece, s.normal = (a.copy() for a in traced)
+
+
+def spread(s, size, longer, turn, chirps, counts):
+    """Power, share of the lobe, range, piece and normal of the chirps with a spot; the others stay silent."""
     power, share, range_m = np.zeros(s.n), np.zeros(s.n), np.zeros(s.n)
-    left = np.arange(0, s.n, 3 if s.draft else 1)
-    for n in (count,) if s.draft else [count * l for l in levels]:
-        points, weight = footprint(n, size, longer, turn, inner)
+    piece, normal = s.piece.copy(), s.normal.copy()
+    for count in counts:
+        points, weight = footprint(count, size, longer, turn)
         apart = []
-        for block in np.array_split(left, 1 + len(left) * n // 100_000):
+        for block in np.array_split(chirps, 1 + len(chirps) * count // 100_000):
             lobe, rest, hits = s.sub_rays(block, points, weight)
             each = lobe + rest
             power[block] = each.sum(1)
             safe = np.maximum(power[block], 1e-30)
             share[block], range_m[block] = lobe.sum(1) / safe, np.sum(each * hits["range"], 1) / safe
-            best, rows = np.argmax(each, 1), np.arange(len(block))
-            new = s.range_m[block] <= 0
-            s.piece[block[new]], s.normal[block[new]] = hits["piece"][rows, best][new], hits["normal"][rows, best][new]
+            new, strongest = s.range_m[block] <= 0, (np.arange(len(block)), np.argmax(each, 1))
+            piece[block[new]], normal[block[new]] = hits["piece"][strongest][new], hits["normal"][strongest][new]
             part = np.stack([each[:, k::4].sum(1) / weight[k::4].sum() for k in range(4)])
-            error = 4.34 * part.std(0) / np.maximum(part.mean(0), 1e-30)
-            apart.append((error > thr) & (power[block] > physics.mw(physics.THRESHOLD_DBM - 15)))
-        left = left[np.concatenate(apart)]
-    s.range_m, s.spread, s.spread_share = range_m, power, share
+            uneven = part.std(0) > 0.035 * part.mean(0)  # 0.15 dB
+            apart.append(uneven & (power[block] > physics.mw(physics.THRESHOLD_DBM - 15)))
+        chirps = chirps[np.concatenate(apart)]
+    return power, share, np.where(power > physics.mw(physics.THRESHOLD_DBM - 40), range_m, 0.0), piece, normal
 
 
 def foreign_patch(s, size, rng):
@@ -228,7 +242,9 @@ EFFECTS = {
     "multi-bounce": multi_bounce, "noise-floor": noise_floor, "pose": pose, "speckle": few_looks, "subsurface": subsurface,
     "thin-film": thin_film, "correlated-shadowing": correlated_shadowing, "unknown": unknown,
 }
-LIMIT = {"thin-film": 1.0, "correlated-shadowing": 1.0}  # sizes beyond which the effect would not be itself
+# Sizes below and beyond which an effect would not be itself: a spot of less than 1 mm changes a few chirps at edges.
+START = {"finite-spot": 0.1}
+LIMIT = {"finite-spot": 3.2, "thin-film": 1.0, "correlated-shadowing": 1.0}
 # Where an effect needs a target of its own: a lobe that is seen all around, a concave place, a rough lobe.
 BASES = {"multi-bounce": ["groove"], "correlated-shadowing": ["vase"]}
 
@@ -266,10 +282,11 @@ def calibrate(make, name, strength, seed, looks):
         return looks_for(looks, SPECKLE_EXCESS_DB[strength]), SPECKLE_EXCESS_DB[strength]
     if name == "noise-floor":
         return NOISE_DB[strength], 0.0
-    goal, start = RMS_DB[strength], 1e-2
+    goal, start = RMS_DB[strength], START.get(name, 1e-2)
 
-    def left(size):
+    def left(size, draft=True):
         before, after = make(), make()
+        after.draft = draft
         EFFECTS[name](after, size, np.random.default_rng(seed))
         return left_after_refit_db(before, after)
 
@@ -283,10 +300,15 @@ def calibrate(make, name, strength, seed, looks):
         if now >= goal or now < 0.7 * most:
             break
         low, size = size, (size * 2 if size == limit else min(size * 2, limit))
-    if most < goal:
+    if most < goal or size == start:
         return best, most
     high = size
-    for _ in range(12):
+    for _ in range(6 if name == "finite-spot" else 12):
         middle = np.sqrt(low * high)
         low, high = (middle, high) if left(middle) < goal else (low, middle)
-    return high, left(high)
+    now = left(high, draft=False)
+    if name == "finite-spot" and abs(now / goal - 1) > 0.03:  # the draft was off
+        slope = np.log(left(1.2 * high) / left(high / 1.2)) / np.log(1.44)
+        high *= (goal / now) ** (1 / max(slope, 0.3))
+        now = left(high, draft=False)
+    return high, now

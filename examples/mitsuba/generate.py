@@ -1,6 +1,7 @@
 """Generate scans with one undeclared effect, a pair, an unknown one or none. See README.md."""
 
 import argparse
+import copy
 import functools
 import json
 import os
@@ -143,15 +144,43 @@ def add_looks(rng, looks, w0, state, shared):
     return fields * np.sqrt(weight / weight.mean())[:, None]
 
 
+@functools.lru_cache
+def load(name):
+    with np.load(f"{HERE}/bases/{name}.npz") as file:
+        return dict(file)
+
+
+@functools.lru_cache
+def calibrated(name, mm, label, strength, draw):
+    make = functools.partial(State, load(name), name, physics.waist_m(mm))
+    return effects.calibrate(make, label, strength, draw, LOOKS)
+
+
+def tilt_spread_db(state, size, use):
+    """Sd over tilts of a chirp's mean power in dB: its quantiles at 0.05, 0.15, ... 0.95 over the chirps."""
+    rng, drawn = np.random.default_rng(0), copy.copy(state)
+    levels = []
+    for _ in range(64):
+        effects.angle_error(drawn, size, rng)
+        levels.append(physics.db(drawn.means_mw()[0][use]))
+    return [round(float(q), 4) for q in np.quantile(np.std(levels, 0), np.arange(0.05, 1, 0.1))]
+
+
+def range_gain(before, ranges, use):
+    """Gain in ln p that the ranges alone offer; of a chirp no more than a false alarm would cost."""
+    change = (ranges - before.range_m)[use & (before.range_m > 0)] / physics.RANGE_SD_M
+    ceiling = np.log(physics.GATE_M / physics.RANGE_SD_M / physics.FALSE_ALARM)
+    return float(np.sum(np.minimum(change**2 / 2, ceiling)))
+
+
 def case(out, number, name, labels, strength, speckle_mm, shared, seed, level_sd):
     rng = np.random.default_rng([seed, number])
     w0 = physics.waist_m(speckle_mm)
-    with np.load(f"{HERE}/bases/{name}.npz") as file:
-        base = dict(file)
+    base = load(name)
     state, sizes, rms, kind = State(base, name, w0), {}, {}, None
     for index, label in enumerate(labels):
-        draw = [seed, number, 77 + index]
-        size, left = effects.calibrate(functools.partial(State, base, name, w0), label, strength, draw, LOOKS)
+        draw = (seed, number, 77 + index)
+        size, left = calibrated(name, speckle_mm, label, strength, draw)
         effects.EFFECTS[label](state, size, np.random.default_rng(draw))
         sizes[label], rms[label] = float(size), float(left)
         kind = getattr(state, "kind", kind)
@@ -183,17 +212,21 @@ def case(out, number, name, labels, strength, speckle_mm, shared, seed, level_sd
     start = write_material(os.path.join(folder, "material"), slug, targets.MATERIALS[name], rng)
     write_scene(os.path.join(folder, "scene.toml"), name, slug, len(parts), speckle_mm, shared, LOOKS, number)
     write_cloud(os.path.join(folder, "cloud.ply"), seen, where, state.ray, state.aim)
-    hit = state.range_m > 0
+    hit, echo = state.range_m > 0, np.isfinite(seen) & ~alarm
     truth = {
         "base": name, "labels": labels, "strength": strength if labels else None, "kind": kind, "sizes": sizes,
         "left_after_refit_db": rms,
         "reaches_strength": all(0.95 <= rms[n] / effects.RMS_DB[strength] <= 1.1 or n in ("speckle", "noise-floor") for n in labels),
         "level_offset_db": level, "speckle": f"shared, w0 = {speckle_mm} mm" if shared else "independent",
-        "looks": float(looks), "noise_dbm": float(physics.db(declared_noise * state.noise_gain)),
+        "looks": float(looks), "declared_looks": LOOKS,
+        "noise_dbm": float(physics.db(declared_noise * state.noise_gain)),
         "chirps": state.n, "hits": int(hit.sum()), "detections": int(np.isfinite(seen).sum()), "false_alarms": int(alarm.sum()),
         "silent_share_of_hits": float(np.mean(~np.isfinite(seen[base["range_m"] > 0]))),
+        "range_gain": range_gain(State(base, name, w0), ranges, echo),
         "law": {k: v for k, v in targets.MATERIALS[name].items()}, "start": start,
     }
+    if "angle-error" in labels:
+        truth["tilt_spread_db"] = tilt_spread_db(state, sizes["angle-error"], echo)
     os.makedirs(os.path.join(out, "truth"), exist_ok=True)
     with open(os.path.join(out, "truth", f"case-{number:03d}.json"), "w") as file:
         json.dump(truth, file, indent=1)
@@ -205,14 +238,11 @@ def choose(allowed, number, labels, arguments, mm):
     turn = (number + arguments.seed) % len(allowed)
     order = allowed[turn:] + allowed[:turn]
     for name in order:
-        with np.load(f"{HERE}/bases/{name}.npz") as file:
-            base = dict(file)
         reached = True
         for index, label in enumerate(labels):
-            draw = [arguments.seed, number, 77 + index]
+            draw = (arguments.seed, number, 77 + index)
             goal = effects.RMS_DB[arguments.strength] if label not in ("speckle", "noise-floor") else 0
-            make = functools.partial(State, base, name, physics.waist_m(mm))
-            left = effects.calibrate(make, label, arguments.strength, draw, LOOKS)[1]
+            left = calibrated(name, mm, label, arguments.strength, draw)[1]
             reached = reached and 0.95 * goal <= left <= 1.1 * goal
         if reached:
             return name

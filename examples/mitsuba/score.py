@@ -3,12 +3,19 @@
 import argparse
 import collections
 import concurrent.futures
+import csv
+import functools
 import json
 import math
 import os
 import shutil
 import subprocess
 import time
+
+
+IN_THE_DATA = 5.0  # gain in ln p below which not even the true form can be seen
+FALSE_ALARM = 3e-4  # declared, of a gate without an echo
+LEFT_DB = {"strong": 1.33, "moderate": 0.665, "weak": 0.33}
 
 
 def diagnose(matdb, folder, seed):
@@ -63,21 +70,80 @@ def intervals(answer, truth):
     return [(n, v, s, t, abs(v - t) <= 1.96 * s) for n, v, s, t in out]
 
 
-def judge(answer, truth):
+@functools.lru_cache
+def independent_share(rays, w0):
+    """Chirps with speckle of their own among all: 1/sum of exp(-2 d^2/w0^2) over the aims at the target plane z = 0."""
+    cells, total = collections.defaultdict(list), 0.0
+    with open(rays) as file:
+        for row in csv.DictReader(file):
+            way = -float(row["oz_m"]) / float(row["dz"])
+            x, y = (float(row[f"o{a}_m"]) + way * float(row[f"d{a}"]) for a in "xy")
+            cells[int(x // (2.5 * w0)), int(y // (2.5 * w0))].append((x, y))
+    for (i, j), mine in cells.items():
+        near = [p for a in (i - 1, i, i + 1) for b in (j - 1, j, j + 1) for p in cells.get((a, b), [])]
+        total += sum(math.exp(-2 * ((x - u) ** 2 + (y - v) ** 2) / w0**2) for x, y in mine for u, v in near)
+    return sum(map(len, cells.values())) / total
+
+
+@functools.lru_cache
+def divergence(true_looks, sd, looks):
+    """Kullback-Leibler divergence, nats a chirp, of powers of `true_looks` looks whose ln mean has the sd `sd` from
+    the closest powers of `looks` looks: those of the same mean."""
+
+    def log_density(u, k):  # of u = ln power, mean 1
+        return k * u - k * math.exp(u) + k * math.log(k) - math.lgamma(k)
+
+    nodes = [(sd * i / 5, math.exp(-((i / 5) ** 2) / 2)) for i in range(-20, 21)] if sd else [(0.0, 1.0)]
+    step, whole = 0.02, sum(w for _, w in nodes)
+    grid = [-25 + step * i for i in range(1550)]
+    p = [sum(w * math.exp(log_density(u - s, true_looks)) for s, w in nodes) / whole for u in grid]
+    mean = math.log(sum(p[i] * math.exp(u) for i, u in enumerate(grid)) * step)
+    inside = [(u, p[i]) for i, u in enumerate(grid) if p[i] > 1e-300]
+    return step * sum(x * (math.log(x) - log_density(u - mean, looks)) for u, x in inside)
+
+
+def expected_gain(truth, folder):
+    """Gain in ln p that the true form of each effect has over the refitted base, from the truth alone."""
+    echoes, looks = truth["detections"] - truth["false_alarms"], truth.get("declared_looks", 4)
+    share = 1.0
+    if truth["speckle"].startswith("shared"):
+        share = independent_share(os.path.join(folder, "rays.csv"), float(truth["speckle"].split()[-2]) / 1000)
+    out = {}
+    for label in truth["labels"]:
+        left = truth["left_after_refit_db"][label] * math.log(10) / 10  # nepers of power
+        if label == "speckle":
+            out[label] = share * echoes * divergence(truth["looks"], 0.0, looks)
+        elif label == "angle-error":
+            # every chirp has a tilt of its own, which neighbours that share a speckle show the better: at least this
+            spread = [s * math.log(10) / 10 for s in truth.get("tilt_spread_db", [])] or [left]
+            out[label] = echoes * sum(divergence(looks, s, looks) for s in spread) / len(spread)
+        elif label == "noise-floor":  # by its false alarms alone, which share no speckle
+            empty = truth["chirps"] - truth["hits"] * (1 - truth["silent_share_of_hits"])
+            count, declared = truth["false_alarms"], max(empty, 1) * FALSE_ALARM
+            out[label] = count * math.log(count / declared) - count + declared if count > declared else 0.0
+        else:
+            out[label] = share * echoes * looks * left**2 / 2
+            if label in ("motion", "pose"):  # which the ranges show as well
+                out[label] += truth.get("range_gain", 0.0)
+    return out
+
+
+def judge(answer, truth, gains):
     """What kind of case it is, whether the answer is right, and the names that were said."""
     said = [e["name"] for e in answer.get("effects", [])]
     labels, verdict = truth["labels"], answer["verdict"]
     if not labels:
         return "complete", verdict == "no-missing-effect", said
     if labels == ["unknown"]:
-        return "unknown", verdict == "unexplained" and not said, said
-    if len(labels) > 1:
-        return "pair", set(labels) == set(said[:2]), said
-    kind = truth["strength"]
-    if not truth["reaches_strength"]:
-        left = truth["left_after_refit_db"][labels[0]]
-        kind = "moderate" if left >= 0.665 and kind == "strong" else "weak" if left >= 0.33 else "not in the data"
-    return kind, said[:1] == labels, said
+        kind, good = "unknown", verdict == "unexplained" and not said
+    elif len(labels) > 1:
+        kind, good = "pair", set(labels) == set(said[:2])
+    else:
+        kind, good = truth["strength"], said[:1] == labels
+        if not truth["reaches_strength"]:
+            left = truth["left_after_refit_db"][labels[0]]
+            kind = next((k for k in list(LEFT_DB)[list(LEFT_DB).index(kind):] if left >= LEFT_DB[k]), "below weak")
+    return "not in the data" if min(gains.values()) < IN_THE_DATA else kind, good, said
 
 
 def main():
@@ -94,11 +160,13 @@ def main():
             truths[n] = json.load(file)
     with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
         answers = dict(zip(names, pool.map(lambda n: diagnose(arguments.matdb, os.path.join(arguments.folder, n), arguments.seed), names)))
-    right, total, held, misses, confusion = collections.Counter(), collections.Counter(), [], [], collections.Counter()
+    right, total, held, confusion = collections.Counter(), collections.Counter(), [], collections.Counter()
+    misses, apart = [], []
     alarms = collections.Counter()
     for n in names:
         truth, answer = truths[n], answers[n]
-        kind, good, said = judge(answer, truth)
+        gains = expected_gain(truth, arguments.folder)
+        kind, good, said = judge(answer, truth, gains)
         total[kind] += 1
         right[kind] += good
         for i in intervals(answer, truth):
@@ -110,13 +178,21 @@ def main():
             alarms["named"] += bool(said)
             alarms["unexplained"] += not said and answer["verdict"] == "unexplained"
         left = ", ".join(f"{u.get('covariate')} {u.get('strength_db') or 0:.2f} dB" for u in answer.get("unexplained", []))
-        if not good:
+        if not good or kind == "not in the data":
             words = "" if said or left else f" [{answer.get('reason') or answer['words'][-200:]}]"
-            misses.append(f"{n} {truth['base']} {'+'.join(truth['labels']) or 'none'} ({truth['strength']}, {truth.get('kind')}, {truth['speckle']}, "
-                          f"level {truth['level_offset_db']:+.1f} dB): {answer['verdict']}, said {'+'.join(said) or 'nothing'}; left: {left or 'nothing'}{words}")
+            gain = ", ".join(f"{v:.1f} for {g}" for g, v in gains.items()) or "none"
+            if set(truth["labels"]) & {"finite-spot", "multi-bounce"}:
+                gain += f", by ranges {truth.get('range_gain', 0.0):.0f} more"
+            (apart if kind == "not in the data" else misses).append(
+                f"{n} {truth['base']} {'+'.join(truth['labels']) or 'none'} ({truth['strength']}, {truth.get('kind')}, "
+                f"{truth['speckle']}, level {truth['level_offset_db']:+.1f} dB; expected gain {gain}): "
+                f"{answer['verdict']}, said {'+'.join(said) or 'nothing'}; left: {left or 'nothing'}{words}")
     print("right first name (pairs: both; unknown: unexplained and no name; complete: nothing missing):")
     for kind in total:
-        print(f"  {kind:16} {right[kind]:4} of {total[kind]}")
+        if kind != "not in the data":
+            print(f"  {kind:16} {right[kind]:4} of {total[kind]}")
+    if apart:
+        print(f"  not in the data: {len(apart)} cases, {right['not in the data']} of them right all the same")
     if total["complete"]:
         print(f"  complete scans with a named effect: {alarms['named']}, called unexplained: {alarms['unexplained']}, of {total['complete']}")
     print(f"95 % intervals that hold the truth: {sum(held)} of {len(held)}")
@@ -129,6 +205,10 @@ def main():
     print("misses:" if misses else "no misses")
     for m in misses:
         print(" ", m)
+    if apart:
+        print(f"not in the data (the true form itself is expected to gain less than {IN_THE_DATA:g} in ln p):")
+        for m in apart:
+            print(" ", m)
 
 
 if __name__ == "__main__":

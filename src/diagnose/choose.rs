@@ -10,19 +10,23 @@
 
 use nalgebra::DVector;
 
-use super::evidence::{Candidate, Evidence};
+use super::error::DiagnoseError;
+use super::evidence::{Candidate, Evidence, Largest};
 use super::exchange::{SAME, exchange};
 use super::explanation::{Addition, Explanation};
 use super::field::Structure;
 use super::refit::{Fit, SCOUT};
+use super::residual::{self, ResidualStructure};
 use super::scorer::{HeldOut, State};
 use super::space::Space;
 use super::support::Judge;
 use super::trial::{Search, Trial};
 use crate::effects::Effect;
 
-/// Most rounds, those included that begin again from a better base.
-const MOST_ROUNDS: usize = 12;
+/// How often the search begins again from a better base before it counts as failed.
+const MOST_STARTS: usize = 4;
+/// Effects of the last round of which it is told whether the strongest one hides them.
+const MOST_HIDDEN: usize = 2;
 /// Effects of one round of which pairs are tried.
 const MOST_PAIRED: usize = 4;
 /// Share of the best held-out gain from which an effect may yet prove better.
@@ -39,25 +43,32 @@ pub(super) struct Choice<'a> {
     pub ranking: Vec<Candidate>,
     /// The structure that a field finds beside the model.
     pub structure: Structure,
+    /// Effects that are supported but for their size beside the strongest.
+    pub hidden: Vec<ResidualStructure>,
 }
 
 /// Adds effects until none is supported, and removes those that others made superfluous or that are
 /// smaller than the structure that the model leaves.
+///
+/// # Errors
+/// When the base is found at a better place time and again.
 pub(super) fn choose_effects<'a>(
     search: &Search,
     mut base: State<'a>,
     effects: &[&'a dyn Effect],
-) -> Choice<'a> {
+) -> Result<Choice<'a>, DiagnoseError> {
     let scorer = &search.scorer;
-    let mut ranking = Vec::new();
+    let (mut ranking, mut hidden) = (Vec::new(), Vec::new());
     let mut model = Explanation { state: base.clone(), added: Vec::new() };
-    for round in 1..=MOST_ROUNDS {
-        if model.added.len() >= scorer.settings.most_effects {
-            break;
-        }
+    let (mut round, mut starts) = (0, 1);
+    while model.added.len() < scorer.settings.most_effects {
+        round += 1;
         let mut trials = search.trials(&model.state, effects, round, model.largest());
         let has_grown =
             add_best(search, &mut model, &mut trials) || add_pair(search, &mut model, &mut trials);
+        if !has_grown {
+            hidden = hidden_by_the_strongest(search, &model, &mut trials);
+        }
         // Of each family the member that was accepted, or the best.
         let mut candidates: Vec<Candidate> =
             trials.into_iter().map(|trial| trial.candidate).collect();
@@ -73,9 +84,12 @@ pub(super) fn choose_effects<'a>(
         if !has_grown {
             break;
         }
-        if round < MOST_ROUNDS
-            && let Some(better) = scorer.better_base(&base, &model.state)
-        {
+        if let Some(better) = scorer.better_base(&base, &model.state) {
+            if starts == MOST_STARTS {
+                let gain = better.fit.ln_likelihood - base.fit.ln_likelihood;
+                return Err(DiagnoseError::SearchFailed { gain });
+            }
+            starts += 1;
             (search.notify)(
                 "starting again: with an effect the laws have found a better place without it",
             );
@@ -97,7 +111,35 @@ pub(super) fn choose_effects<'a>(
     let space = &model.state.space;
     model.added.iter_mut().for_each(|one| one.class.retain(|name| !space.has(name)));
     ranking.iter_mut().for_each(|one| one.accepted &= space.has(one.name));
-    Choice { base, model, ranking, structure }
+    Ok(Choice { base, model, ranking, structure, hidden })
+}
+
+/// Effects beside which the strongest one leaves no room for a name, though the data support them otherwise.
+fn hidden_by_the_strongest<'a>(
+    search: &Search,
+    model: &Explanation<'a>,
+    trials: &mut [Trial<'a>],
+) -> Vec<ResidualStructure> {
+    let (scorer, mut found) = (&search.scorer, Vec::new());
+    if model.added.is_empty() {
+        return found;
+    }
+    let judge = Judge::new(*scorer, &model.state, Largest::default());
+    let least = |trial: &Trial| scorer.settings.least_gain_of(trial.candidate.numbers, trial.tried);
+    let promising = trials.iter_mut().filter(|trial| trial.candidate.gain > least(trial));
+    for trial in promising.take(MOST_HIDDEN) {
+        if trial.candidate.sampled {
+            search.refit(&model.state, trial);
+        }
+        if judge.support(trial).is_some()
+            && trial.candidate.size_db >= scorer.settings.least_structure_db
+            && judge.beats_placebos(trial)
+            && let Some([gain, se]) = trial.candidate.held_out
+        {
+            found.push(residual::may_be(trial.candidate.name, trial.candidate.size_db, gain / se));
+        }
+    }
+    found
 }
 
 /// A trial that the data support.

@@ -123,6 +123,16 @@ pub enum DiagnoseError {
         /// Chirps that meet the target.
         shots: usize,
     },
+    /// Searches of the scattering models find ever better fits.
+    #[error(
+        "the search failed: time and again the scattering models fit better from another start, the last time by \
+         {gain:.1} in ln p; give the materials laws nearer to the data, such as one fitted to a curve of this cloud \
+         by `matdb measure` and `matdb fit`"
+    )]
+    SearchFailed {
+        /// Gain in ln likelihood of the last start.
+        gain: f64,
+    },
     /// Too few detections.
     #[error(
         "{detected} detections on the target cannot distinguish effects; {LEAST_DETECTIONS} are needed, \

@@ -1,9 +1,10 @@
 //! The level of a radar that nobody calibrated, and the scale of the materials it sees.
 //!
 //! The level is a constant factor on every echo. Data tell its product with the scale of each law, and neither alone. A law
-//! is therefore held near the scale that is stored: ln(1 + r²/2) is added to −ln p for a scale r deviations of
-//! [`SCALE_SD_DB`] away from it. Common to all laws, a change is the level's. The tails are long, so that one wrong law among
-//! three or more does not draw the level along; two that disagree leave two optima, and a search ends in one.
+//! is therefore held near the scale that is stored: ν/2·ln(1 + r²/ν) is added to −ln p for a scale r deviations of
+//! [`SCALE_SD_DB`] away from it, as of Student's t of [`FREEDOM`] ν. Common to all laws, a change is the level's. The tails are
+//! long, so that one wrong law among three or more does not draw the level along; two that disagree leave two optima, and a
+//! search ends in one.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -16,6 +17,8 @@ use crate::fit::minimise::Local;
 
 /// How far the scale of a stored law is trusted, dB: what careful measurements of one surface differ by.
 const SCALE_SD_DB: f64 = 1.0;
+/// Degrees of freedom of that trust: ten standard deviations cost 9.5 in ln p.
+const FREEDOM: f64 = 7.0;
 /// How far off a level may be, dB.
 pub(super) const MOST_OFF_DB: f64 = 60.0;
 /// Step of a difference quotient by a coordinate of a law.
@@ -54,8 +57,8 @@ pub(super) fn prior<'a>(
             there[index] += STEP;
             slopes[first + index] = (off(&there) - r) / STEP;
         }
-        let weight = 1.0 / (1.0 + 0.5 * r * r);
-        sum.value += (0.5 * r * r).ln_1p();
+        let weight = 1.0 / (1.0 + r * r / FREEDOM);
+        sum.value += 0.5 * FREEDOM * (r * r / FREEDOM).ln_1p();
         sum.add(weight * r, weight, &slopes);
     }
     sum

@@ -6,7 +6,7 @@
 //! without an effect. A score test screens the library on a sample of the shots. The best few effects are
 //! fitted together with the scattering models and must predict patches of the scan that took no part in their fit. When no
 //! further effect does, effects that others made superfluous are removed. The remainder is tested: by a smooth field
-//! over every covariate, by the correlation of neighbours, by the scatter, and for outliers.
+//! over every covariate, by the correlation of neighbours, by the scatter, by the order of the chirps, and for outliers.
 //!
 //! | step | file |
 //! |---|---|
@@ -17,7 +17,7 @@
 //! | the promise of an effect | `screen.rs` |
 //! | the score of a model on held-out patches | `folds.rs`, `score.rs`, `scorer.rs` |
 //! | the choice: trials, support, rivals, removal | `trial.rs`, `support.rs`, `choose.rs`, `exchange.rs`, `explanation.rs` |
-//! | what remains | `covariates.rs`, `field.rs`, `residual.rs`, `scatter.rs`, `remains.rs` |
+//! | what remains | `covariates.rs`, `field.rs`, `residual.rs`, `scatter.rs`, `order.rs`, `remains.rs` |
 //! | controls of the answer | `controls.rs`, `placebo.rs`, `recovery.rs` |
 //! | the report | `report.rs`, `answer.rs` |
 //! | the diagnosis of a measured curve | `curve/` |
@@ -38,6 +38,7 @@ mod level;
 mod likelihood;
 mod matching;
 mod observation;
+mod order;
 mod placebo;
 mod problem;
 mod ranges;

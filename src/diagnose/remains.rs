@@ -2,6 +2,7 @@
 
 use super::covariates::covariates;
 use super::field::Structure;
+use super::order;
 use super::problem::Problem;
 use super::residual::{self, ResidualStructure, speckle_sd_db};
 use super::scatter::Tests;
@@ -20,11 +21,13 @@ pub(super) struct Remainder<'a> {
     pub largest_db: f64,
     /// Detections far off the target.
     pub off_target: usize,
+    /// What the strongest effect may hide.
+    pub hidden: &'a [ResidualStructure],
 }
 
 /// Every structure that exceeds chance, strongest first.
 pub(super) fn find_unexplained(scorer: &Scorer, remainder: &Remainder) -> Vec<ResidualStructure> {
-    let Remainder { prediction, z, structure, largest_db, off_target } = *remainder;
+    let Remainder { prediction, z, structure, largest_db, off_target, hidden } = *remainder;
     let Problem { shots, observations, alarms, declared, shared, .. } = scorer.problem;
     let covariates = covariates(shots, prediction, observations);
     let tests = tests(scorer.settings, largest_db);
@@ -32,6 +35,7 @@ pub(super) fn find_unexplained(scorer: &Scorer, remainder: &Remainder) -> Vec<Re
     if let Some(structure) = structure {
         found.extend(residual::of_field(structure));
     }
+    found.extend(hidden.iter().cloned());
     let neighbours = scorer.shared(prediction, z);
     if scorer.is_shared(&neighbours, largest_db) {
         found.push(neighbours);
@@ -42,8 +46,11 @@ pub(super) fn find_unexplained(scorer: &Scorer, remainder: &Remainder) -> Vec<Re
         found.push(ResidualStructure { covariate, strength_db, p_value });
     }
     found.extend(residual::outliers(z, prediction, declared, observations, off_target));
+    let sd_db = speckle_sd_db(prediction.receiver.looks);
+    let swing = order::swing(z, shots, observations, shared, sd_db);
+    found.extend(swing.filter(|swing| swing.strength_db >= scorer.least_structure_db(largest_db)));
     found.extend(residual::steps(observations));
-    found.extend(residual::skewness(z, shared, speckle_sd_db(prediction.receiver.looks)));
+    found.extend(residual::skewness(z, shared, sd_db));
     found.sort_by(|a, b| b.strength_db.total_cmp(&a.strength_db));
     found
 }

@@ -213,6 +213,12 @@ pub(super) fn steps(observations: &[Observation]) -> Option<ResidualStructure> {
     })
 }
 
+/// An effect that may be real beside a stronger one: its size, dB, and its held-out gain in standard errors.
+pub(super) fn may_be(effect: &str, strength_db: f64, errors: f64) -> ResidualStructure {
+    let p_value = 0.5 * erfc(errors / SQRT_2);
+    ResidualStructure { covariate: format!("may be {effect}"), strength_db, p_value }
+}
+
 /// Structure of the means that a field has found: the covariates with the largest parts.
 pub(super) fn of_field(structure: &Structure) -> Vec<ResidualStructure> {
     let [gain, se] = structure.gain;

@@ -70,7 +70,7 @@ impl Diagnosis {
         let search = Search { scorer, sample, notify };
 
         let members: Vec<&dyn Effect> = effects.iter().flat_map(|effect| family(*effect)).collect();
-        let choice = choose_effects(&search, base, &members);
+        let choice = choose_effects(&search, base, &members)?;
         let base = &choice.base;
         let off_target = detections_off_target(&scorer, subject, &choice.model.state)?;
         refuse_a_poor_fit(&scorer.errors(&choice.model.state.held_out))?;
@@ -93,13 +93,13 @@ fn report(
     off_target: usize,
     controls: Controls,
 ) -> Report {
-    let Choice { base, model, ranking, structure } = choice;
+    let Choice { base, model, ranking, structure, hidden } = choice;
     let State { space, fit, held_out } = &model.state;
     let prediction = &scorer.predict(&model.state);
     let [z_before, z] = [&scorer.predict(base), prediction].map(|prediction| scorer.z(prediction));
     let largest_db = model.largest().size_db;
     let structure = Some(structure).filter(|structure| scorer.is_structured(structure, largest_db));
-    let remainder = Remainder { prediction, z: &z, structure, largest_db, off_target };
+    let remainder = Remainder { prediction, z: &z, structure, largest_db, off_target, hidden };
     let unexplained = find_unexplained(scorer, &remainder);
     // Held-out errors without and with the effects, and with the field.
     let errors = [&base.held_out, held_out].map(|held_out| scorer.errors(held_out));

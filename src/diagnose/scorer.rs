@@ -236,7 +236,8 @@ impl Scorer<'_> {
         neighbours.p_value < CHANCE && neighbours.strength_db >= self.least_structure_db(largest_db)
     }
 
-    fn least_structure_db(&self, largest_db: f64) -> f64 {
+    /// Structure that counts beside a largest effect of this size, dB.
+    pub fn least_structure_db(&self, largest_db: f64) -> f64 {
         self.settings.least_structure_db.max(SHARE_OF_FORM * largest_db)
     }
 

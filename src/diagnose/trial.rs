@@ -291,7 +291,7 @@ impl<'p> Search<'p> {
     }
 
     /// Fits a trial to all shots.
-    fn refit(&self, state: &State, trial: &mut Trial) {
+    pub fn refit(&self, state: &State, trial: &mut Trial) {
         let problem = &self.scorer.problem;
         let held = state.space.costly(&state.fit.at);
         // A fit to the sample may be worse for all shots than the effect's absence.

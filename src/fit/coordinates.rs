@@ -116,6 +116,18 @@ impl Coordinate {
         [self.searched(self.min), self.searched(self.max)]
     }
 
+    /// Ends of the range, in the search, in which a start is sought: of a permittivity, on either side of zero, those of
+    /// matter. Far beyond, all mirrors reflect alike, and a search finds no way back.
+    pub fn usual_ends(&self) -> [f64; 2] {
+        /// Permittivities of what hardly reflects, and of what reflects nearly all.
+        const OF_MATTER: [f64; 2] = [1.02, 300.0];
+        let [lower, upper] = self.ends();
+        match self.scale {
+            Scale::Asinh => OF_MATTER.map(|value| self.searched(value).clamp(lower, upper)),
+            Scale::Linear | Scale::Log { .. } => [lower, upper],
+        }
+    }
+
     /// Largest distance of a drawn start from the given one.
     pub fn spread(&self) -> f64 {
         let [lower, upper] = self.ends();

@@ -20,6 +20,9 @@ const LIKELIHOOD_TOLERANCE: f64 = 1e-6;
 /// Most steps of the approach with fixed looks, and the promised ln likelihood that ends it.
 const APPROACH: usize = 40;
 const NEAR: f64 = 1.0;
+/// Steps with the second derivatives themselves, where the products of the scores do not arrive: of few rows they are a
+/// poor guide. They promise less than this at the end.
+const POLISH: Minimise = Minimise { iterations: 40, tolerance: 1e-5, patience: usize::MAX };
 /// Least squares ends when a step promises to lower the cost by less; its parameters are compared with other programs.
 const SQUARES_TOLERANCE: f64 = 1e-8;
 /// Loss of cost that still counts as the same optimum.
@@ -57,9 +60,12 @@ impl Fit {
         match self.method {
             Method::Censored => {
                 let likelihood = Likelihood::new(coordinates, rows, self.noise_w.unwrap_or(0.0));
-                search_freely(&likelihood_search(), coordinates, start, |at| {
-                    likelihood.local(Curvature::Scores, at)
-                })
+                let cost = |at: &DVector<f64>| likelihood.local(Curvature::Scores, at);
+                polished(
+                    coordinates,
+                    search_freely(&likelihood_search(), coordinates, start, cost),
+                    cost,
+                )
             }
             Method::Tls { theta_sd_rad, level_sd_db } => {
                 let deviations = Deviations { theta_sd_rad, level_sd_db };
@@ -80,7 +86,7 @@ impl Fit {
             let [lower, upper] = coordinates.holding_looks(start);
             let near = approach
                 .run(start, [&lower, &upper], |at| likelihood.local(Curvature::FromAfar, at));
-            search_freely(&search, coordinates, &near.at, cost)
+            polished(coordinates, search_freely(&search, coordinates, &near.at, cost), cost)
         });
         let information = observed_information(coordinates, &best.at, &best.local, cost);
         let uncertainty = Uncertainty::new(coordinates, &best.at, &information);
@@ -169,6 +175,26 @@ fn search_freely(
     cost: impl Fn(&DVector<f64>) -> Local,
 ) -> Minimum {
     search.run(start, [&coordinates.lower(), &coordinates.upper()], cost)
+}
+
+/// A search that did not arrive, continued with the second derivatives themselves.
+fn polished(
+    coordinates: &Coordinates,
+    found: Minimum,
+    cost: impl Fn(&DVector<f64>) -> Local,
+) -> Minimum {
+    if found.converged() || found.stop == Stop::NotFinite {
+        return found;
+    }
+    let better = search_freely(&POLISH, coordinates, &found.at, |at| {
+        let local = cost(at);
+        let mut bends = observed_information(coordinates, at, &local, &cost).symmetric_eigen();
+        // Where it bends down, a step as long as where it bends up as much.
+        let most = bends.eigenvalues.amax();
+        bends.eigenvalues.apply(|bend| *bend = bend.abs().max(1e-12 * most));
+        Local { curvature: bends.recompose(), ..local }
+    });
+    Minimum { iterations: found.iterations + better.iterations, ..better }
 }
 
 /// Information of least squares: the curvature over the residuals' own variance.

@@ -2,26 +2,30 @@
 //!
 //! Given the shapes of its lobes a law is linear in their levels, so that the search over the levels alone is easy and
 //! ends in one place (Golub & Pereyra 1973, DOI 10.1137/0710036). The shapes have many local optima. They are tried at places
-//! that cover their ranges evenly, each with the levels that fit best there, on a sample of the rows; searches of all
-//! numbers on all rows start from the best of them.
+//! that cover their ranges evenly, each with the levels that fit best there, on a sample of the rows. From the best of
+//! them short searches of all numbers follow, and searches on all rows start where these end best.
 
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::coordinates::{Coordinates, LOOKS};
-use super::minimise::{Local, Minimise};
+use super::coordinates::{Coordinate, Coordinates, LOOKS};
+use super::minimise::{Local, Minimise, Minimum};
 use crate::brdf::Scattering;
 use crate::material::Observation;
 
 /// Rows of the sample.
 const ROWS: usize = 250;
 /// Places that are tried for each shape, and in all.
-const PER_SHAPE: usize = 8;
-const MOST: usize = 64;
+const PER_SHAPE: usize = 12;
+const MOST: usize = 144;
 /// Search of the levels at one place; it only has to rank the places.
 const LEVELS: Minimise = Minimise { iterations: 6, tolerance: 1.0, patience: 3 };
+/// Places from which a short search follows, for each start that is wanted.
+const FOLLOWED: usize = 8;
+/// That search: it only has to rank their optima.
+const SHORT: Minimise = Minimise { iterations: 10, tolerance: 0.1, patience: 4 };
 /// Share of the range of a shape within which two places lead to the same optimum.
-const NEAR: f64 = 0.2;
+const NEAR: f64 = 0.1;
 /// Incidences at which a number is tested for being a level, rad.
 const ANGLES_RAD: [f64; 4] = [0.0, 0.05, 0.3, 1.0];
 
@@ -43,33 +47,42 @@ pub(crate) fn starts(
         return Vec::new();
     }
     let (lower, upper) = (coordinates.lower(), coordinates.upper());
+    let usual: Vec<[f64; 2]> = coordinates.list.iter().map(Coordinate::usual_ends).collect();
     let places = MOST.min(PER_SHAPE.saturating_pow(shapes.len() as u32));
-    let mut found: Vec<(f64, DVector<f64>)> = (0..places)
-        .into_par_iter()
-        .map(|place| {
-            let mut start = coordinates.start();
-            for (&index, share) in shapes.iter().zip(evenly(place, shapes.len())) {
-                start[index] = lower[index] + share * (upper[index] - lower[index]);
+    let ranked = |found: Vec<Minimum>| {
+        let mut found = found;
+        found.retain(|one| one.local.value.is_finite());
+        found.sort_by(|a, b| a.local.value.total_cmp(&b.local.value));
+        let mut apart: Vec<DVector<f64>> = Vec::new();
+        for Minimum { at, .. } in found {
+            let is_near = |other: &DVector<f64>| {
+                shapes
+                    .iter()
+                    .all(|&i| (at[i] - other[i]).abs() < NEAR * (usual[i][1] - usual[i][0]))
+            };
+            if !apart.iter().any(is_near) {
+                apart.push(at);
             }
-            let [mut low, mut high] = coordinates.holding_looks(&start);
-            for &index in &shapes {
-                (low[index], high[index]) = (start[index], start[index]);
-            }
-            let there = LEVELS.run(&start, [&low, &high], &cost);
-            (there.local.value, there.at)
-        })
-        .filter(|(value, _)| value.is_finite())
-        .collect();
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let is_near = |a: &DVector<f64>, b: &DVector<f64>| {
-        shapes.iter().all(|&i| (a[i] - b[i]).abs() < NEAR * (upper[i] - lower[i]))
-    };
-    let mut starts: Vec<DVector<f64>> = Vec::new();
-    for (_, at) in found {
-        if starts.len() < count && starts.iter().all(|start| !is_near(start, &at)) {
-            starts.push(at);
         }
-    }
+        apart
+    };
+    let tried = (0..places).into_par_iter().map(|place| {
+        let mut start = coordinates.start();
+        for (&index, share) in shapes.iter().zip(evenly(place, shapes.len())) {
+            let [low, high] = usual[index];
+            start[index] = low + share * (high - low);
+        }
+        let [mut low, mut high] = coordinates.holding_looks(&start);
+        for &index in &shapes {
+            (low[index], high[index]) = (start[index], start[index]);
+        }
+        LEVELS.run(&start, [&low, &high], &cost)
+    });
+    let mut best = ranked(tried.collect());
+    best.truncate(FOLLOWED * count);
+    let followed = best.into_par_iter().map(|at| SHORT.run(&at, [&lower, &upper], &cost));
+    let mut starts = ranked(followed.collect());
+    starts.truncate(count);
     starts
 }
 

@@ -86,6 +86,9 @@ fn would_help(error: &DiagnoseError) -> &'static str {
             "Chirp numbers as the scan of the scene has them; without the column `chirp` the points are \
              given to their chirps by direction."
         }
+        DiagnoseError::SearchFailed { .. } => {
+            "Scattering models to start from that are nearer to the data."
+        }
         DiagnoseError::Threshold { .. } => {
             "The power below which the radar reports nothing, as `threshold_dbm` under [radar] in the \
              scene, and powers in dBm at the receiver."

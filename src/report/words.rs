@@ -130,6 +130,10 @@ pub(super) fn covariate(name: &str) -> (String, &'static str) {
         let hint = "The powers scatter more or less than declared there: speckle, noise or tilts.";
         return (format!("scatter over {inner}"), hint);
     }
+    if let Some(effect) = name.strip_prefix("may be ") {
+        let hint = "Beside the strongest effect it may be real, or make up for an error of that one's form.";
+        return (format!("what may be {effect}"), hint);
+    }
     let (words, hint) = match name {
         "spread" => {
             ("scatter", "All powers scatter more or less than declared: speckle, or its law.")
@@ -143,6 +147,9 @@ pub(super) fn covariate(name: &str) -> (String, &'static str) {
             ("distance from the middle of the target", "The gain changes in rings.")
         }
         "distance from edge" => ("distance from the nearest edge", "The beam has a width."),
+        "order of the chirps" => {
+            ("the order of the chirps", "Something swings while the scan runs.")
+        }
         "progress" => ("time", "Something changed while the scan ran."),
         "predicted power" => ("predicted power", "The receiver is not linear, or noise is added."),
         "region" => ("region", "A region has another material than declared."),
