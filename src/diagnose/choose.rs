@@ -162,8 +162,8 @@ fn add_best<'a>(search: &Search, model: &mut Explanation<'a>, trials: &mut [Tria
         contenders.remove(0);
     }
     let Some(first) = contenders.first() else { return false };
-    // Of those that predict equally well, by the rule of one standard error, the one with the fewest parameters in use
-    // is added, and of equally simple ones the likelier.
+    // Of those that predict equally well, by the rule of one standard error, the one with the fewest parameters in use and
+    // the laws nearest to those stored is added, and of equals the likelier.
     let mut tied = Vec::new();
     for other in &contenders {
         let [worse, se] = scorer.difference(&first.held_out, &other.held_out);
@@ -173,10 +173,11 @@ fn add_best<'a>(search: &Search, model: &mut Explanation<'a>, trials: &mut [Tria
             tied.push(other);
         }
     }
-    let best = tied.iter().min_by_key(|one| {
+    let against = |one: &Contender| {
         let Trial { space, fit, .. } = &trials[one.trial];
-        space.parameters_in_use(&fit.at)
-    });
+        space.against(&fit.at)
+    };
+    let best = tied.iter().min_by(|a, b| against(a).total_cmp(&against(b)));
     let best = best.map_or(first, |best| *best);
     // Of its family the simplest member.
     let name = trials[best.trial].candidate.name;

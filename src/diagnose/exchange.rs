@@ -51,11 +51,10 @@ fn contest<'a>(
     let Trial { space, fit, mut candidate, .. } = trial;
     let with_rival = scorer.settle(without, space, fit, held_out);
     candidate.held_out = Some(scorer.difference(&with_rival.held_out, &without.held_out));
-    // Of effects that predict equally well the one with fewer parameters in use is better.
+    // Of effects that predict equally well the one with fewer parameters in use and nearer laws is better.
     let [better, se] = scorer.difference(&with_rival.held_out, &state.held_out);
     let is_tied = better.abs() <= se.max(SAME);
-    let [own, other] =
-        [&*state, &with_rival].map(|state| state.space.parameters_in_use(&state.fit.at));
+    let [own, other] = [&*state, &with_rival].map(|state| state.space.against(&state.fit.at));
     let is_better = if is_tied && own != other { other < own } else { better > 0.0 };
     let mut loser = rival.name();
     if is_better {

@@ -19,6 +19,10 @@ use crate::fit::minimise::Local;
 const SCALE_SD_DB: f64 = 1.0;
 /// Degrees of freedom of that trust: ten standard deviations cost 9.5 in ln p.
 const FREEDOM: f64 = 7.0;
+/// How far the widths and exponents of a stored law are trusted, as a share of their range in the search, which counts up
+/// to this length: a factor of 1.6 for a width.
+const SHAPE_SD: f64 = 0.1;
+const SHAPES_REACH: f64 = 5.0;
 /// How far off a level may be, dB.
 pub(super) const MOST_OFF_DB: f64 = 60.0;
 /// Step of a difference quotient by a coordinate of a law.
@@ -36,6 +40,29 @@ fn ln_scale(law: &Brdf) -> f64 {
         sum += law.sigma0(theta_rad) * theta_rad.sin() * x * x;
     }
     sum.max(f64::MIN_POSITIVE).ln()
+}
+
+/// How far laws are from those stored in what data hardly tell apart with an effect: their widths and exponents, in ln p.
+/// Of two models that predict alike the one with the nearer laws is the likelier.
+pub(super) fn off_the_stored<'a>(
+    laws: impl Iterator<Item = (usize, &'a Coordinates)>,
+    at: &DVector<f64>,
+) -> f64 {
+    let mut sum = 0.0;
+    for (first, coordinates) in laws {
+        let (start, [lower, upper]) =
+            (coordinates.start(), [coordinates.lower(), coordinates.upper()]);
+        for (index, known) in coordinates.list.iter().enumerate() {
+            if known.is_level() {
+                continue;
+            }
+            // A logarithm, or a place in its range.
+            let width = (upper[index] - lower[index]).min(SHAPES_REACH);
+            let r = (at[first + index] - start[index]) / (SHAPE_SD * width);
+            sum += 0.5 * FREEDOM * (r * r / FREEDOM).ln_1p();
+        }
+    }
+    sum
 }
 
 /// What is added to −ln p for the scales of laws, each with its coordinates and their place among all unknowns.

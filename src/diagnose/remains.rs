@@ -2,7 +2,6 @@
 
 use super::covariates::covariates;
 use super::field::Structure;
-use super::order;
 use super::problem::Problem;
 use super::residual::{self, ResidualStructure, speckle_sd_db};
 use super::scatter::Tests;
@@ -47,7 +46,7 @@ pub(super) fn find_unexplained(scorer: &Scorer, remainder: &Remainder) -> Vec<Re
     }
     found.extend(residual::outliers(z, prediction, declared, observations, off_target));
     let sd_db = speckle_sd_db(prediction.receiver.looks);
-    let swing = order::swing(z, shots, observations, shared, sd_db);
+    let swing = scorer.swing(prediction, z);
     found.extend(swing.filter(|swing| swing.strength_db >= scorer.least_structure_db(largest_db)));
     found.extend(residual::steps(observations));
     found.extend(residual::skewness(z, shared, sd_db));

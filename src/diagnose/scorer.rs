@@ -6,6 +6,7 @@ use nalgebra::DVector;
 use super::covariates::covariates;
 use super::field::{Field, Model, Structure, scaled, terms};
 use super::folds::Folds;
+use super::order;
 use super::problem::{Problem, Sample};
 use super::refit::{Fit, SCOUT, SEARCH};
 use super::residual::{self, ResidualStructure, speckle_sd_db};
@@ -201,6 +202,12 @@ impl Scorer<'_> {
         let from_m = spot_m.max(self.problem.shared.reach_m);
         let apart_m = from_m..from_m + spot_m;
         residual::of_neighbours(z, self.problem.shots, apart_m, sd_db, self.folds)
+    }
+
+    /// The swing of residuals with the chirp number.
+    pub fn swing(&self, prediction: &Prediction, z: &[f64]) -> Option<ResidualStructure> {
+        let Problem { shots, observations, shared, .. } = self.problem;
+        order::swing(z, shots, observations, shared, speckle_sd_db(prediction.receiver.looks))
     }
 
     /// The speckle that shots share beside a model.

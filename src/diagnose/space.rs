@@ -3,7 +3,7 @@
 
 use nalgebra::DVector;
 
-use super::level::{MOST_OFF_DB, prior};
+use super::level::{MOST_OFF_DB, off_the_stored, prior};
 use super::observation::DB;
 use crate::brdf::Brdf;
 use crate::effects::{Effect, Model, Receiver, Shot, rank};
@@ -273,6 +273,12 @@ impl<'a> Space<'a> {
         parameters
             .filter(|(known, value)| effect.moves() || (value - known.absent).abs() > known.step)
             .count()
+    }
+
+    /// How much speaks against a point beside its likelihood, in ln p: the parameters in use of the last effect, and how
+    /// far the laws are from those stored.
+    pub fn against(&self, at: &DVector<f64>) -> f64 {
+        self.parameters_in_use(at) as f64 + off_the_stored(self.laws_with_places(), at)
     }
 
     /// The model at a point.

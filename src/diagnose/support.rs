@@ -16,9 +16,9 @@ pub(super) const SHARE_OF_LARGEST: f64 = 0.2;
 const SHARE_OF_SPREAD: f64 = 0.4;
 /// Share of its gain that an effect on the scatter must keep where a field has corrected the means.
 const SHARE_BESIDE_FIELD: f64 = 0.5;
-/// Largest residual that neighbours may share, as a share of the size of such an effect: the scatter of every shot
-/// is independent.
-const MOST_SHARED: f64 = 0.6;
+/// Largest residual that neighbours in place or in time may share, as a share of the size of such an effect: the scatter
+/// of every shot is independent.
+const MOST_SHARED: f64 = 0.35;
 /// Share of its gain that an effect of one small place keeps where it is held out.
 const SHARE_KEPT: f64 = 0.6;
 /// Gain of such an effect, in least gains, and any held-out gain in standard errors, that leaves no doubt.
@@ -120,7 +120,9 @@ impl<'j, 'p, 'a> Judge<'j, 'p, 'a> {
         let structure = self.structure.get_or_init(|| self.scorer.structure(self.state));
         let shared_db = *self.shared_db.get_or_init(|| {
             let prediction = self.scorer.predict(self.state);
-            self.scorer.shared(&prediction, &self.scorer.z(&prediction)).strength_db
+            let z = self.scorer.z(&prediction);
+            let swing_db = self.scorer.swing(&prediction, &z).map_or(0.0, |one| one.strength_db);
+            self.scorer.shared(&prediction, &z).strength_db.max(swing_db)
         });
         let with = self.scorer.ln_likelihood_with(&trial.space, &trial.fit, structure);
         let without = self.scorer.ln_likelihood_with(&self.state.space, &self.state.fit, structure);

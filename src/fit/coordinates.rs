@@ -96,6 +96,11 @@ impl Coordinate {
         self.scale.value(searched).clamp(self.min, self.max)
     }
 
+    /// Whether the coordinate is one of the two levels of a mixture.
+    pub fn is_level(&self) -> bool {
+        self.name == SPECULAR_LEVEL || self.name == DIFFUSE_LEVEL
+    }
+
     /// Whether the coordinate is of the diffuse part of a mixture.
     fn is_diffuse(&self) -> bool {
         self.name.starts_with("diffuse.") || self.name == DIFFUSE_LEVEL
