@@ -68,15 +68,18 @@ impl<'a> Explanation<'a> {
     /// Removes effects that are smaller than the structure that the model leaves, which is returned.
     pub fn remove_smaller_than_structure(&mut self, scorer: &Scorer) -> Structure {
         let mut structure = scorer.structure(&self.state);
-        while let Some(least) = self.smallest()
-            && scorer.is_structured(&structure, 0.0)
-            && self.added[least].evidence.size_db < structure.size_db
-        {
+        while let Some(least) = self.smallest() {
+            let size_db = self.added[least].evidence.size_db;
+            let is_coarse = scorer.is_structured(&structure, 0.0) && size_db < structure.size_db;
+            let is_fine = size_db < scorer.fine_structure_db(&self.state);
+            if !is_coarse && !is_fine {
+                break;
+            }
             let without = scorer.without(&self.state, least);
             let left = scorer.structure(&without);
             // An effect that predicts more than any field of the means is not an error of their form.
             let [gain, _] = scorer.difference(&self.state.held_out, &without.held_out);
-            if gain > left.gain[0] {
+            if !is_fine && gain > left.gain[0] {
                 break;
             }
             (self.state, structure) = (without, left);

@@ -90,7 +90,7 @@ mod tests {
         let chirps = Chirps::draw(&radar, |_| Err("no file".to_owned())).unwrap();
         let shots: Vec<Shot> = (0..4000).map(|index| Shot::missed(&chirps, index, 0.0)).collect();
         let seen =
-            |index: usize| Observation { power_w: (index % 5 != 0).then_some(1e-9), range_m: None };
+            |index: usize| Observation { power_w: (!index.is_multiple_of(5)).then_some(1e-9), range_m: None };
         let observations: Vec<Observation> = (0..shots.len()).map(seen).collect();
         let z = |index: usize| {
             let key = Key { seed, chirp: index as u64, sub_ray: 0, purpose: Purpose::Fit };

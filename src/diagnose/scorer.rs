@@ -210,6 +210,16 @@ impl Scorer<'_> {
         order::swing(z, shots, observations, shared, speckle_sd_db(prediction.receiver.looks))
     }
 
+    /// The structure too fine for a field that neighbours in place or in time share beside a model, dB; 0 where chance
+    /// explains it.
+    pub fn fine_structure_db(&self, state: &State) -> f64 {
+        let prediction = self.predict(state);
+        let z = self.z(&prediction);
+        let neighbours = Some(self.shared(&prediction, &z)).filter(|one| one.p_value < CHANCE);
+        let found = neighbours.into_iter().chain(self.swing(&prediction, &z));
+        found.map(|one| one.strength_db).fold(0.0, f64::max)
+    }
+
     /// The speckle that shots share beside a model.
     pub fn shared_speckle(&self, state: &State) -> SharedSpeckle {
         let z = self.z(&self.predict(state));
