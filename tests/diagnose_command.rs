@@ -123,6 +123,40 @@ fn speckle_that_neighbours_share_is_no_effect() {
     assert!((0.05..0.5).contains(&share), "{share}");
 }
 
+/// Several rays in a spot and second-order paths, as the scene tells the renderer to follow them.
+#[test]
+fn what_the_renderer_follows_is_no_effect() {
+    let corner = SCENE.replace("rotation_deg = [-15, 10, 0]", "rotation_deg = [-80, 0, 0]");
+    let several = SCENE.replace("[radar]\n", "[spot]\nrays = 64\n[radar]\n");
+    let bounce = corner.replace("[radar]\n", "[bounce]\nrays = 64\n[radar]\n");
+    for (scene, follows, effects) in [
+        (&several, "finite-spot", "foreign-patch,subsurface,finite-spot"),
+        (&bounce, "multi-bounce", "foreign-patch,subsurface,multi-bounce"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path();
+        fs::write(at.join("scene.toml"), scene).unwrap();
+        matdb(at).args(["render", "-q", "scene.toml", "-o", "out"]).assert().success();
+        let arguments = ["diagnose", "-q", "out/cloud.ply", "--scene", "scene.toml"];
+        let output = ["-o", "answer", "--effects", effects];
+        matdb(at).args(arguments).args(output).assert().success();
+        let report = json(&at.join("answer/report.json"));
+        assert_eq!(report["verdict"], "no-missing-effect", "{follows}: {}", report["effects"]);
+        let is_left_out = |one: &Value| one["name"] == follows && one["reason"] == "declared";
+        assert!(report["not_tried"].as_array().unwrap().iter().any(is_left_out), "{follows}");
+    }
+    // Without the paths that were followed the model lacks something.
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("several.toml"), &several).unwrap();
+    fs::write(at.join("scene.toml"), SCENE).unwrap();
+    matdb(at).args(["render", "-q", "several.toml", "-o", "out"]).assert().success();
+    let arguments = ["diagnose", "-q", "out/cloud.ply", "--scene", "scene.toml", "-o", "answer"];
+    matdb(at).args(arguments).args(["--effects", "finite-spot,subsurface"]).assert().success();
+    let report = json(&at.join("answer/report.json"));
+    assert_eq!(report["effects"][0]["name"], "finite-spot", "{report}");
+}
+
 /// A radar that was never calibrated: its scene states a loss that is 15 dB wrong, to either side.
 #[test]
 fn the_level_of_a_radar_is_no_effect() {

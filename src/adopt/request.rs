@@ -6,13 +6,13 @@ use super::earlier::check_folder;
 use super::recipients::{check_fit_name, find_recipient};
 use super::scene_after::{AFTER, check_beside};
 use crate::diagnose::{DiagnoseError, MeasuredScene, Report, declared_receiver};
-use crate::effects::{Effect, library};
+use crate::effects::{BeamSpot, Effect, MultiBounce, library};
 use crate::error::Error;
 use crate::files::folder_of;
 use crate::measure::{Cloud, CloudError};
 use crate::radar::Pattern;
 use crate::report::{Choice, Measurands, Reason};
-use crate::scene::{Scene, read_text};
+use crate::scene::{BounceEntry, Scene, read_text};
 use crate::setup::ReadyScene;
 use crate::store::Store;
 
@@ -94,12 +94,13 @@ impl<'a> CloudRequest<'a> {
     }
 
     fn choose_effects(&self, ready: &ReadyScene) -> Result<Choice, Error> {
-        let model = ready.model();
+        let (model, scene) = (ready.model(), &ready.scene);
+        let rendered = Rendered::of(scene);
         let mut declared = Vec::new();
-        for (effect, _) in model.as_ref().map_or(&[][..], |model| &model.effects) {
+        for (effect, _) in model.iter().flat_map(|model| &model.effects) {
             declared.push(effect.name());
         }
-        let scene = &ready.scene;
+        declared.extend(rendered.effects().iter().map(|(effect, _)| effect.name()));
         let (_, of_radar) = declared_receiver(scene.radar());
         let measured =
             Measurands { times: scene.chirps.is_timed(), ranges: of_radar.range_sd_m > 0.0 };
@@ -146,13 +147,15 @@ impl CheckedRequest<'_> {
         cloud: &Cloud,
         hear: &(dyn Fn(&str) + Sync),
     ) -> Result<Report, DiagnoseError> {
-        let model = self.ready.model();
+        let (model, rendered) = (self.ready.model(), Rendered::of(&self.ready.scene));
+        let mut declared_effects = rendered.effects();
+        declared_effects.extend(model.iter().flat_map(|model| model.effects.iter().cloned()));
         let measured = MeasuredScene {
             scene: &self.ready.scene,
             cloud,
             laws: &self.ready.laws(),
             seen_lobe_rad: &self.ready.seen_lobe_rad(),
-            declared_effects: model.as_ref().map_or(&[][..], |model| &model.effects),
+            declared_effects: &declared_effects,
         };
         measured.diagnose(self.request.seed, &self.choice.tried, hear)
     }
@@ -190,13 +193,43 @@ fn named_files(scene: &Scene, path: &Path) -> Vec<PathBuf> {
     files
 }
 
+/// What a scene tells the renderer to follow beside single rays, as effects at work.
+struct Rendered {
+    /// Of several rays in a spot.
+    spot: Option<BeamSpot>,
+    /// Of second-order paths.
+    bounces: bool,
+}
+
+impl Rendered {
+    fn of(scene: &Scene) -> Rendered {
+        let diameter_m = scene.radar().spot_fwhm_m();
+        let spot = (scene.file.spot.rays > 1).then_some(BeamSpot { diameter_m });
+        Rendered { spot, bounces: scene.file.bounce.is_some() }
+    }
+
+    fn effects(&self) -> Vec<(&dyn Effect, Vec<f64>)> {
+        let spot = self.spot.as_ref().map(|spot| (spot as &dyn Effect, Vec::new()));
+        // As strong as the laws and the antenna's pattern have it.
+        let bounces = self.bounces.then_some((&MultiBounce as &dyn Effect, vec![0.0]));
+        spot.into_iter().chain(bounces).collect()
+    }
+}
+
+/// Whether second-order paths are those that a diagnosis predicts.
+fn is_usual(bounce: &BounceEntry) -> bool {
+    let usual = BounceEntry::default();
+    bounce.outside_spot_db == usual.outside_spot_db && bounce.in_phase == usual.in_phase
+}
+
 /// Refuses what a scene declares and no diagnosis predicts: it would be found as an effect.
 fn check_predicted(scene: &Scene, path: &Path) -> Result<(), Error> {
     let radar = scene.radar();
-    let (what, way_out) = if scene.file.spot.rays > 1 {
-        ("several rays in a spot", "set spot.rays = 1 and declare [[radar.effect]] `finite-spot`")
-    } else if scene.file.bounce.is_some() {
-        ("a second bounce", "replace [bounce] by [[effect]] `multi-bounce`")
+    let (what, way_out) = if scene.file.bounce.as_ref().is_some_and(|bounce| !is_usual(bounce)) {
+        (
+            "a second bounce of other side lobes than -20 dB, or in phase",
+            "replace [bounce] by [[effect]] `multi-bounce`",
+        )
     } else if radar.receiver.is_some() {
         ("a range receiver", "replace [radar.receiver] by [radar.noise] and [radar.speckle]")
     } else if scene.target.transmits() {

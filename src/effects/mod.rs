@@ -36,6 +36,8 @@ pub use echo::MeanEcho;
 pub use effect::{About, Conflict, Effect, EffectParameter, Level, Setting, Survey};
 pub use entry::{EffectError, EffectList, entry, resolve};
 pub(crate) use intersection::shot_at;
+pub(crate) use library::finite_spot::BeamSpot;
+pub(crate) use library::multi_bounce::MultiBounce;
 pub(crate) use library::rank;
 pub use library::{find, library};
 pub(crate) use member::family;

@@ -13,7 +13,7 @@ pub mod solids;
 mod target;
 
 pub use error::SceneError;
-pub use file::SceneFile;
+pub use file::{BounceEntry, SceneFile};
 pub use load::Scene;
 pub(crate) use read::read_regular;
 pub use read::read_text;

@@ -21,12 +21,42 @@ use crate::trace::{Hit, closest};
 
 pub(crate) struct FiniteSpot;
 
+/// The spot of the radar's own beam, which a scene with several rays in a spot has. It has no number to be found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct BeamSpot {
+    /// Its largest diameter at half the intensity, m.
+    pub diameter_m: f64,
+}
+
+/// The diameter of spots at half the intensity.
+#[derive(Clone, Copy)]
+enum Diameter {
+    /// The same for all, m.
+    Of(f64),
+    /// That of the beam where its axis meets the target.
+    OfBeam,
+}
+
+impl Diameter {
+    /// A number that no other diameter has.
+    fn key(self) -> u64 {
+        match self {
+            Diameter::Of(diameter_m) => diameter_m.to_bits(),
+            Diameter::OfBeam => 0,
+        }
+    }
+}
+
 /// Rays that stand for spots of all diameters. On a ball a highlight may be a tenth of a spot.
 const RAYS: usize = 160;
 /// Radii of the first and of the last ray, m.
 const RADII_M: [f64; 2] = [2.5e-4, 0.18];
 /// The widest spot, m. The last ray is three standard deviations of its two-way weight from its middle.
 const MOST_M: f64 = 0.2;
+/// Diameter at half the intensity exp(−2r²/w²) over the radius w: √(2 ln 2).
+const FWHM_OVER_RADIUS: f64 = 1.177_410_022_515_474_7;
+/// How far off its axis a spot detects a target, in diameters: to where the intensity is 19 dB down.
+const OUTER: f64 = 1.25;
 /// Least weight of a ray that counts, as a share of the largest.
 const LEAST_WEIGHT: f64 = 1e-4;
 /// Largest factor, and one over it the smallest, by which other effects may change the power of a shot.
@@ -78,6 +108,8 @@ type Spot = (SpotRay, Vec<SpotRay>);
 /// The spots of all shots.
 struct Spots {
     all: Vec<Option<Spot>>,
+    /// Diameter of the beam at each, m.
+    of_beam_m: Vec<f64>,
     /// Their answers to terms of level 1, for a diameter in bits: a law's levels change more often than its shape.
     sums: Cache<(u16, Term, u64), Vec<Sums>, MOST_TERMS>,
 }
@@ -147,24 +179,24 @@ impl Sums {
 }
 
 impl ShadedSpots {
-    /// The level, 1/sr, of each term of the laws and how spots of a diameter, m, answer to it. A law that is no sum of
+    /// The level, 1/sr, of each term of the laws and how spots of a diameter answer to it. A law that is no sum of
     /// terms is one of level 1.
-    fn answers(&self, diameter_m: f64) -> Vec<(f64, Arc<Vec<Sums>>)> {
-        let (weights, bits) = (&weights(diameter_m), diameter_m.to_bits());
+    fn answers(&self, diameter: Diameter) -> Vec<(f64, Arc<Vec<Sums>>)> {
+        let key = diameter.key();
         let mut answers = Vec::new();
         for (region, law) in (0..).zip(&self.laws) {
             let Some(terms) = law.backscatter() else {
-                let sums = self.sums.get_or_make((region, bits), || {
+                let sums = self.sums.get_or_make((region, key), || {
                     let f = |beam_rad, v| law.seen_by(beam_rad, v, v).f_per_sr;
-                    self.spots.sums(weights, region, f)
+                    self.spots.sums(diameter, region, f)
                 });
                 answers.push((1.0, sums));
                 continue;
             };
             for term in terms {
                 let shape = Term { level_per_sr: 1.0, ..term };
-                let sums = self.spots.sums.get_or_make((region, shape, bits), || {
-                    self.spots.sums(weights, region, |beam_rad, v| {
+                let sums = self.spots.sums.get_or_make((region, shape, key), || {
+                    self.spots.sums(diameter, region, |beam_rad, v| {
                         shape.per_sr(Look { beam_rad, cos_theta: v.cos_theta() })
                     })
                 });
@@ -179,21 +211,26 @@ impl Spots {
     /// The sums of every spot over the rays of a region, for f of a beam's divergence, rad, and a direction, 1/sr.
     fn sums(
         &self,
-        weights: &[f64; RAYS],
+        diameter: Diameter,
         region: u16,
         f: impl Fn(f64, Direction<Surface>) -> f64 + Sync,
     ) -> Vec<Sums> {
-        let spots = self.all.par_iter();
-        spots
-            .map(|spot| {
-                spot.as_ref().map_or(Sums::default(), |spot| Sums::of(spot, weights, region, &f))
-            })
-            .collect()
+        let common = match diameter {
+            Diameter::Of(diameter_m) => Some(weights(diameter_m)),
+            Diameter::OfBeam => None,
+        };
+        let spots = self.all.par_iter().zip(&self.of_beam_m);
+        let sums = spots.map(|(spot, of_beam_m)| {
+            let Some(spot) = spot else { return Sums::default() };
+            let weights = common.unwrap_or_else(|| weights(*of_beam_m));
+            Sums::of(spot, &weights, region, &f)
+        });
+        sums.collect()
     }
 }
 
 /// The spots of all shots.
-fn spots(stage: &Stage, shots: &[Shot]) -> Vec<Option<Spot>> {
+fn spots(stage: &Stage, shots: &[Shot]) -> Spots {
     let axes: Vec<Ray<Global>> = shots.iter().map(|shot| shot.ray).collect();
     let centres = closest(stage.geometry.bvh, &axes);
     let beams: Vec<GaussianBeam> = shots.iter().map(|shot| stage.beam(shot)).collect();
@@ -207,7 +244,7 @@ fn spots(stage: &Stage, shots: &[Shot]) -> Vec<Option<Spot>> {
     let facets = if facets < shots.len() * RAYS { 0..facets } else { 0..0 };
     let facets: Vec<Facet> =
         facets.into_par_iter().with_min_len(1024).map(|facet| Facet::of(stage, facet)).collect();
-    (&axes, &beams, &centres, &rays)
+    let all = (&axes, &beams, &centres, &rays)
         .into_par_iter()
         .zip(hits.par_chunks(RAYS))
         .map(|((axis, beam, centre, rays), hits)| {
@@ -221,7 +258,35 @@ fn spots(stage: &Stage, shots: &[Shot]) -> Vec<Option<Spot>> {
             spot.shrink_to_fit();
             Some((centre, spot))
         })
-        .collect()
+        .collect();
+    let of_beam = beams.iter().zip(&centres).map(|(beam, centre)| {
+        let range_m = centre.as_ref().map_or(beam.focus_m, |hit| hit.range_m);
+        beam.section(range_m).radius_m * FWHM_OVER_RADIUS
+    });
+    Spots { all, of_beam_m: of_beam.collect(), sums: Cache::default() }
+}
+
+/// Shades the traced rays of a list of shots with some laws.
+fn shaded(survey: &Survey, laws: &[Brdf]) -> Survey {
+    let Some(spots) = survey.downcast_ref::<Arc<Spots>>() else { return Box::new(()) };
+    let (spots, laws) = (spots.clone(), laws.to_vec());
+    Box::new(ShadedSpots { spots, laws, sums: Cache::default() })
+}
+
+/// Averages the echoes of some shots over spots of a diameter.
+fn average(diameter: Diameter, shaded: &Survey, arrived: &mut [Option<MeanEcho>]) {
+    let Some(shaded) = shaded.downcast_ref::<ShadedSpots>() else { return };
+    let answers = shaded.answers(diameter);
+    for (shot, one) in arrived.iter_mut().enumerate() {
+        let sums = answers.iter().filter_map(|(level, of)| Some((*level, of.get(shot)?)));
+        let sums = sums.fold(Sums::default(), |sums, (level, of)| sums.and(level, of));
+        if let (Some(one), Some(averaged)) = (one, sums.averaged()) {
+            let gain = one.power_w / averaged.centre_w;
+            one.power_w = averaged.mean_w * gain.clamp(1.0 / MOST_GAIN, MOST_GAIN);
+            one.range_m += averaged.longer_m;
+            one.spread_m = one.spread_m.hypot(averaged.spread_m);
+        }
+    }
 }
 
 /// One ray of the spot of a beam, where it hits; `facets` may be empty.
@@ -316,9 +381,8 @@ impl Effect for FiniteSpot {
         [0.1, 0.3, 0.75, 1.5].map(|share| vec![(share * nominal_m).clamp(1e-3, MOST_M)]).to_vec()
     }
 
-    /// To where the intensity is 19 dB down.
     fn reach_off_axis_m(&self, values: &[f64]) -> f64 {
-        1.25 * values.first().copied().unwrap_or_default()
+        OUTER * values.first().copied().unwrap_or_default()
     }
 
     fn survey_key(&self, values: &[f64]) -> Option<Vec<f64>> {
@@ -326,29 +390,49 @@ impl Effect for FiniteSpot {
     }
 
     fn survey(&self, _: &[f64], stage: &Stage, shots: &[Shot]) -> Survey {
-        Box::new(Arc::new(Spots { all: spots(stage, shots), sums: Cache::default() }))
+        Box::new(Arc::new(spots(stage, shots)))
     }
 
     fn shade(&self, survey: &Survey, laws: &[Brdf]) -> Survey {
-        let Some(spots) = survey.downcast_ref::<Arc<Spots>>() else { return Box::new(()) };
-        let (spots, laws) = (spots.clone(), laws.to_vec());
-        Box::new(ShadedSpots { spots, laws, sums: Cache::default() })
+        shaded(survey, laws)
     }
 
     fn arrive(&self, values: &[f64], shaded: &Survey, arrived: &mut [Option<MeanEcho>]) {
-        let shaded = shaded.downcast_ref::<ShadedSpots>();
-        let Some((shaded, diameter_m)) = shaded.zip(values.first()) else { return };
-        let answers = shaded.answers(*diameter_m);
-        for (shot, one) in arrived.iter_mut().enumerate() {
-            let sums = answers.iter().filter_map(|(level, of)| Some((*level, of.get(shot)?)));
-            let sums = sums.fold(Sums::default(), |sums, (level, of)| sums.and(level, of));
-            if let (Some(one), Some(averaged)) = (one, sums.averaged()) {
-                let gain = one.power_w / averaged.centre_w;
-                one.power_w = averaged.mean_w * gain.clamp(1.0 / MOST_GAIN, MOST_GAIN);
-                one.range_m += averaged.longer_m;
-                one.spread_m = one.spread_m.hypot(averaged.spread_m);
-            }
+        if let Some(&diameter_m) = values.first() {
+            average(Diameter::Of(diameter_m), shaded, arrived);
         }
+    }
+}
+
+const ABOUT_BEAM: About = About { parameters: &[], conflicts: &[], ..ABOUT };
+
+impl Effect for BeamSpot {
+    fn about(&self) -> &About {
+        &ABOUT_BEAM
+    }
+
+    fn starts(&self, _stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
+        vec![Vec::new()]
+    }
+
+    fn reach_off_axis_m(&self, _values: &[f64]) -> f64 {
+        OUTER * self.diameter_m
+    }
+
+    fn survey_key(&self, _values: &[f64]) -> Option<Vec<f64>> {
+        Some(Vec::new())
+    }
+
+    fn survey(&self, _: &[f64], stage: &Stage, shots: &[Shot]) -> Survey {
+        Box::new(Arc::new(spots(stage, shots)))
+    }
+
+    fn shade(&self, survey: &Survey, laws: &[Brdf]) -> Survey {
+        shaded(survey, laws)
+    }
+
+    fn arrive(&self, _: &[f64], shaded: &Survey, arrived: &mut [Option<MeanEcho>]) {
+        average(Diameter::OfBeam, shaded, arrived);
     }
 }
 
@@ -383,7 +467,8 @@ mod tests {
         };
         let over_a_border = (ray(0, 0.1), vec![ray(0, 0.2), ray(1, 0.3), ray(1, 0.05)]);
         let all = vec![Some(over_a_border), None, Some((ray(1, 0.2), vec![ray(1, 0.25)]))];
-        let spots = Arc::new(Spots { all: all.clone(), sums: Cache::default() });
+        let of_beam_m = vec![0.02; all.len()];
+        let spots = Arc::new(Spots { all: all.clone(), of_beam_m, sums: Cache::default() });
         let law = |f_lambda: f64, m: f64| paint(CookTorrance { f_lambda, m, ..lobe() });
         let tabled = Brdf::Lambert(Lambert { albedo: 0.5 });
         let first = [law(0.2, 0.2), law(0.1, 0.3)];
@@ -392,7 +477,8 @@ mod tests {
         for laws in [&first, &other_level, &other_shape, &first] {
             let survey: Survey = Box::new(spots.clone());
             let shaded = FiniteSpot.shade(&survey, laws);
-            let answers = shaded.downcast_ref::<ShadedSpots>().unwrap().answers(0.02);
+            let shaded = shaded.downcast_ref::<ShadedSpots>().unwrap();
+            let answers = shaded.answers(Diameter::Of(0.02));
             for (shot, spot) in all.iter().enumerate() {
                 let add =
                     |sums: Sums, (level, of): &(f64, Arc<Vec<Sums>>)| sums.and(*level, &of[shot]);
