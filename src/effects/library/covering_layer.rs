@@ -13,7 +13,7 @@ const OVALS_M: [f64; 2] = [0.1, 0.2];
 /// Least cos θ: a flat layer seen edge-on is as deep as it is wide.
 const LEAST_COS_THETA: f64 = 0.02;
 
-const PARAMETERS: [EffectParameter; 8] = [
+const PARAMETERS: [EffectParameter; 10] = [
     EffectParameter::new("loss_db", "dB", [0.0, 30.0], 0.0, 0.5),
     EffectParameter::new("boundary_m", "m", [-3.0, 3.0], 0.0, 0.02),
     EffectParameter::new("direction_deg", "deg", [-360.0, 360.0], 90.0, 5.0),
@@ -22,7 +22,12 @@ const PARAMETERS: [EffectParameter; 8] = [
     EffectParameter::new("length_m", "m", [0.01, OPEN_M], OPEN_M, 0.02),
     EffectParameter::new("width_m", "m", [0.01, OPEN_M], OPEN_M, 0.02),
     EffectParameter::new("turn_deg", "deg", [-360.0, 360.0], 0.0, 10.0),
+    EffectParameter::new("thicker_x_per_m", "1/m", [-20.0, 20.0], 0.0, 0.5),
+    EffectParameter::new("thicker_y_per_m", "1/m", [-20.0, 20.0], 0.0, 0.5),
 ];
+
+/// Largest factor, and one over it the smallest, by which the thickness of a layer may differ from that in its middle.
+const MOST_UNEVEN: f64 = 5.0;
 
 /// Half axis of an outline that is none, m.
 const OPEN_M: f64 = 100.0;
@@ -50,7 +55,8 @@ const ABOUT: About = About {
          with the way through the layer, as 1/cos θ. The layer lies on the far side of a straight line across \
          the field of view, or within an oval. The line lies boundary_m from the field's centre, in a direction \
          counted from x_t towards y_t, and the layer lies beyond it. An oval takes its place where length_m and width_m are \
-         given: half axes about its centre, the first turned from x_t towards y_t.",
+         given: half axes about its centre, the first turned from x_t towards y_t. From there its thickness changes by these \
+         shares per metre.",
     signature: "The power drops at an edge and stays low behind it, more so at large angles. A foreign \
          patch has the same offset at all angles; a gain over the field and a \
          drift change without an edge. A layer over everything cannot be told from the calibration.",
@@ -63,9 +69,9 @@ impl Effect for CoveringLayer {
         &ABOUT
     }
 
-    /// Beyond a line; and within an oval.
+    /// Beyond a line; within an oval; and within one of uneven thickness.
     fn members(&self) -> &'static [&'static [usize]] {
-        &[&[0, 1, 2], &[0, 3, 4, 5, 6, 7]]
+        &[&[0, 1, 2], &[0, 3, 4, 5, 6, 7], &[0, 3, 4, 5, 6, 7, 8, 9]]
     }
 
     /// Lines that cut off a third and two thirds of the shots, from four sides, and ovals that lie on the target.
@@ -78,19 +84,21 @@ impl Effect for CoveringLayer {
             for share in [1.0 / 3.0, 2.0 / 3.0] {
                 let boundary_m = along_m.get((share * along_m.len() as f64) as usize).copied();
                 let boundary_m = boundary_m.unwrap_or(0.0).clamp(-3.0, 3.0);
-                starts.push(vec![1.0, boundary_m, direction_deg, 0.0, 0.0, OPEN_M, OPEN_M, 0.0]);
+                let line = [1.0, boundary_m, direction_deg, 0.0, 0.0, OPEN_M, OPEN_M];
+                starts.push(line.into_iter().chain([0.0; 3]).collect());
             }
         }
         let ovals = cells_with_shots(shots, OVALS_M).into_iter().map(|([x_m, y_m], side_m)| {
             let [x_m, y_m] = [x_m, y_m].map(|centre_m| centre_m.clamp(-3.0, 3.0));
-            vec![1.0, PARAMETERS[1].absent, 90.0, x_m, y_m, side_m, side_m, 0.0]
+            let oval = [1.0, PARAMETERS[1].absent, 90.0, x_m, y_m, side_m, side_m];
+            oval.into_iter().chain([0.0; 3]).collect()
         });
         starts.extend(ovals);
         starts
     }
 
     fn place(&self, values: &[f64]) -> Option<Place> {
-        let &[_, off_m, direction_deg, x_m, y_m, length_m, width_m, _] = values else {
+        let &[_, off_m, direction_deg, x_m, y_m, length_m, width_m, ..] = values else {
             return None;
         };
         if length_m.min(width_m) < OPEN_M {
@@ -100,13 +108,26 @@ impl Effect for CoveringLayer {
     }
 
     fn gain(&self, values: &[f64], stage: &Stage, shot: &Shot) -> f64 {
-        let &[loss_db, boundary_m, direction_deg, x_m, y_m, length_m, width_m, turn_deg] = values
+        let &[
+            loss_db,
+            boundary_m,
+            direction_deg,
+            x_m,
+            y_m,
+            length_m,
+            width_m,
+            turn_deg,
+            by_x,
+            by_y,
+        ] = values
         else {
             return 1.0;
         };
         if loss_db == 0.0 {
             return 1.0;
         }
+        let thicker = 1.0 + by_x * (shot.xt_m - x_m) + by_y * (shot.yt_m - y_m);
+        let loss_db = loss_db * thicker.clamp(1.0 / MOST_UNEVEN, MOST_UNEVEN);
         let left = ratio_from_db(-loss_db / shot.hit.cos_theta.max(LEAST_COS_THETA));
         let beyond_m = if length_m.min(width_m) < OPEN_M {
             within_m(shot, [x_m, y_m], [length_m, width_m], turn_deg)
@@ -127,7 +148,7 @@ mod tests {
         let bench = Bench::plate();
         let mut shot = Shot { yt_m, ..bench.shots[0] };
         shot.hit.cos_theta = theta_deg.to_radians().cos();
-        let line = [1.5, 0.1, 90.0, 0.0, 0.0, OPEN_M, OPEN_M, 0.0];
+        let line = [1.5, 0.1, 90.0, 0.0, 0.0, OPEN_M, OPEN_M, 0.0, 0.0, 0.0];
         db(CoveringLayer.gain(&line, &bench.stage(), &shot))
     }
 
@@ -137,7 +158,7 @@ mod tests {
         let gain_db = |xt_m: f64, yt_m: f64| {
             let shot = Shot { xt_m, yt_m, ..bench.shots[0] };
             // 0.4 m along the diagonal, 0.1 m across it.
-            let oval = [2.0, 0.0, 90.0, 0.1, 0.2, 0.4, 0.1, 45.0];
+            let oval = [2.0, 0.0, 90.0, 0.1, 0.2, 0.4, 0.1, 45.0, 0.0, 0.0];
             let there = CoveringLayer.gain(&oval, &bench.stage(), &shot);
             db(there) * shot.hit.cos_theta
         };
@@ -150,6 +171,17 @@ mod tests {
         // On the outline half of a spot is covered.
         let half = 0.1 + 0.4 / 2f64.sqrt();
         assert!((gain_db(half, half + 0.1) + 0.89).abs() < 0.05, "{}", gain_db(half, half + 0.1));
+    }
+
+    #[test]
+    fn a_layer_may_be_thicker_to_one_side_and_is_never_a_gain() {
+        let bench = Bench::plate();
+        for (xt_m, expected_db) in [(0.1, -2.0), (0.2, -3.0), (0.0, -1.0), (-0.2, -0.4)] {
+            let shot = Shot { xt_m, yt_m: 0.2, ..bench.shots[0] };
+            let uneven = [2.0, 0.0, 90.0, 0.1, 0.2, 0.6, 0.6, 0.0, 5.0, 0.0];
+            let found = db(CoveringLayer.gain(&uneven, &bench.stage(), &shot));
+            assert!((found * shot.hit.cos_theta - expected_db).abs() < 1e-3, "{xt_m}: {found}");
+        }
     }
 
     #[test]
