@@ -1,9 +1,11 @@
 """Fit every curve with matdb, and compare its ln p with the reference's. See README.md."""
 
 import argparse
+import hashlib
 import json
 import os
 import resource
+import shutil
 import subprocess
 import time
 
@@ -119,7 +121,10 @@ def main():
     parser.add_argument("--only-table", action="store_true", help="print what is stored")
     parser.add_argument("--extra", nargs=argparse.REMAINDER, default=[], help="further options of matdb fit")
     a = parser.parse_args()
-    store = f"{a.folder}/results.jsonl"
+    # Of one program and its options: results of another would be mixed in.
+    with open(shutil.which(a.matdb) or a.matdb, "rb") as file:
+        key = hashlib.sha256(file.read() + " ".join(a.extra).encode()).hexdigest()[:12]
+    store = f"{a.folder}/results-{key}.jsonl"
     if a.again and os.path.exists(store):
         os.remove(store)
     results = [json.loads(line) for line in open(store)] if os.path.exists(store) else []

@@ -4,7 +4,7 @@
 //! the scattering models, first to the sample, the best few to all shots. These predict held-out patches from fits
 //! without them. One is accepted under four conditions. Its held-out gain, or its gain in the fit if that is less, exceeds
 //! two standard errors over patches (or, for means that shift in one small place, is far beyond chance and
-//! found again where it was not fitted). Held-out errors do not grow. Its gain in the fit beats that of
+//! found again where it was not fitted). Held-out errors do not grow, unless that gain leaves no doubt. Its gain in the fit beats that of
 //! placebos and a stated least. It changes the data by a stated least size. Where placebos beat all, two effects that
 //! predict held-out patches are tried together: either alone describes both worse than a wave does.
 
@@ -12,7 +12,7 @@ use nalgebra::DVector;
 
 use super::error::DiagnoseError;
 use super::evidence::{Candidate, Evidence, Largest};
-use super::exchange::{SAME, exchange};
+use super::exchange::{EVEN, SAME, exchange};
 use super::explanation::{Addition, Explanation};
 use super::field::Structure;
 use super::refit::{Fit, SCOUT};
@@ -23,9 +23,9 @@ use super::support::Judge;
 use super::trial::{Search, Trial};
 use crate::effects::Effect;
 
-/// How often the search begins again from a better base before it counts as failed.
+/// How often the search begins. If the base is then at a better place again that could change the answer, it has failed.
 const MOST_STARTS: usize = 4;
-/// Effects of the last round of which it is told whether the strongest one hides them.
+/// Effects of the last round that are tested for being real beside the strongest.
 const MOST_HIDDEN: usize = 2;
 /// Effects of one round of which pairs are tried.
 const MOST_PAIRED: usize = 4;
@@ -87,7 +87,10 @@ pub(super) fn choose_effects<'a>(
         if let Some(better) = scorer.better_base(&base, &model.state) {
             if starts == MOST_STARTS {
                 let gain = better.fit.ln_likelihood - base.fit.ln_likelihood;
-                return Err(DiagnoseError::SearchFailed { gain });
+                if gain > scorer.settings.least_gain {
+                    return Err(DiagnoseError::SearchFailed { gain });
+                }
+                continue;
             }
             starts += 1;
             (search.notify)(
@@ -111,16 +114,19 @@ pub(super) fn choose_effects<'a>(
     let space = &model.state.space;
     model.added.iter_mut().for_each(|one| one.class.retain(|name| !space.has(name)));
     ranking.iter_mut().for_each(|one| one.accepted &= space.has(one.name));
+    // Without an effect nothing is hidden, and what was exchanged for another is not.
+    hidden.retain(|(name, _)| !space.effects.is_empty() && !space.has(name));
+    let hidden = hidden.into_iter().map(|(_, structure)| structure).collect();
     Ok(Choice { base, model, ranking, structure, hidden })
 }
 
-/// Effects beside which the strongest one leaves no room for a name, though the data support them otherwise.
+/// Effects that the data support by themselves, and that get no name because the strongest one is so much larger.
 fn hidden_by_the_strongest<'a>(
     search: &Search,
     model: &Explanation<'a>,
     trials: &mut [Trial<'a>],
-) -> Vec<ResidualStructure> {
-    let (scorer, mut found) = (&search.scorer, Vec::new());
+) -> Vec<(&'static str, ResidualStructure)> {
+    let (scorer, mut found): (_, Vec<(&str, _)>) = (&search.scorer, Vec::new());
     if model.added.is_empty() {
         return found;
     }
@@ -135,8 +141,10 @@ fn hidden_by_the_strongest<'a>(
             && trial.candidate.size_db >= scorer.settings.least_structure_db
             && judge.beats_placebos(trial)
             && let Some([gain, se]) = trial.candidate.held_out
+            && found.iter().all(|(name, _)| *name != trial.candidate.name)
         {
-            found.push(residual::may_be(trial.candidate.name, trial.candidate.size_db, gain / se));
+            let Candidate { name, size_db, .. } = trial.candidate;
+            found.push((name, residual::may_be(name, size_db, gain / se)));
         }
     }
     found
@@ -177,7 +185,8 @@ fn add_best<'a>(search: &Search, model: &mut Explanation<'a>, trials: &mut [Tria
         let Trial { space, fit, .. } = &trials[one.trial];
         space.against(&fit.at)
     };
-    let best = tied.iter().min_by(|a, b| against(a).total_cmp(&against(b)));
+    let least = tied.iter().map(|one| against(one)).fold(f64::INFINITY, f64::min);
+    let best = tied.iter().find(|one| against(one) < least + EVEN);
     let best = best.map_or(first, |best| *best);
     // Of its family the simplest member.
     let name = trials[best.trial].candidate.name;

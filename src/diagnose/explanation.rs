@@ -68,10 +68,12 @@ impl<'a> Explanation<'a> {
     /// Removes effects that are smaller than the structure that the model leaves, which is returned.
     pub fn remove_smaller_than_structure(&mut self, scorer: &Scorer) -> Structure {
         let mut structure = scorer.structure(&self.state);
+        // Once: the residual of an effect that is removed would count against the next.
+        let fine_db = scorer.fine_structure_db(&self.state);
         while let Some(least) = self.smallest() {
             let size_db = self.added[least].evidence.size_db;
             let is_coarse = scorer.is_structured(&structure, 0.0) && size_db < structure.size_db;
-            let is_fine = size_db < scorer.fine_structure_db(&self.state);
+            let is_fine = size_db < fine_db;
             if !is_coarse && !is_fine {
                 break;
             }

@@ -14,6 +14,7 @@ use super::observation::DB;
 use crate::brdf::{Brdf, Scattering};
 use crate::fit::coordinates::Coordinates;
 use crate::fit::minimise::Local;
+use crate::fit::shapes::shapes;
 
 /// How far the scale of a stored law is trusted, dB: what careful measurements of one surface differ by.
 const SCALE_SD_DB: f64 = 1.0;
@@ -52,10 +53,7 @@ pub(super) fn off_the_stored<'a>(
     for (first, coordinates) in laws {
         let (start, [lower, upper]) =
             (coordinates.start(), [coordinates.lower(), coordinates.upper()]);
-        for (index, known) in coordinates.list.iter().enumerate() {
-            if known.is_level() {
-                continue;
-            }
+        for index in shapes(coordinates) {
             // A logarithm, or a place in its range.
             let width = (upper[index] - lower[index]).min(SHAPES_REACH);
             let r = (at[first + index] - start[index]) / (SHAPE_SD * width);
@@ -94,6 +92,7 @@ pub(super) fn prior<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::brdf::Lambert;
     use crate::fit::twin::mixture;
 
     #[test]
@@ -102,6 +101,25 @@ mod tests {
             .map(|(m, level)| ln_scale(&mixture(m, 6.0, 0.05 * level, 0.002 * level)));
         assert!((twice - law - 2f64.ln()).abs() < 1e-9, "{}", twice - law);
         assert!((wide - law).abs() < 0.03, "{}", wide - law);
+    }
+
+    #[test]
+    fn lobes_in_each_other_s_place_are_far_from_the_stored_ones() {
+        let coordinates =
+            Coordinates::new(&mixture(0.1, 1.0, 0.05, 0.002), &[], &[], Some(4.0)).unwrap();
+        let off = |law: &Brdf| {
+            let there = Coordinates::new(law, &[], &[], Some(4.0)).unwrap().start();
+            off_the_stored([(0, &coordinates)].into_iter(), &there)
+        };
+        assert_eq!(off(&mixture(0.1, 1.0, 0.5, 0.02)), 0.0);
+        let [near, swapped] =
+            [(0.12, 1.5), (0.85, 90.0)].map(|(m, alpha)| off(&mixture(m, alpha, 0.05, 0.002)));
+        assert!(near < 1.0 && swapped > 8.0, "{near} {swapped}");
+        // The level of a law that is no mixture is a level, too.
+        let lambert = |albedo| Brdf::Lambert(Lambert { albedo });
+        let flat = Coordinates::new(&lambert(0.3), &[], &[], Some(4.0)).unwrap();
+        let there = Coordinates::new(&lambert(0.01), &[], &[], Some(4.0)).unwrap().start();
+        assert_eq!(off_the_stored([(0, &flat)].into_iter(), &there), 0.0);
     }
 
     #[test]

@@ -74,7 +74,7 @@ pub use report::{
     Base, BaseValue, BeforeAfter, Control, Controls, FoundEffect, MeshPose, Parameters, Power,
     Report, Row, SCHEMA, Triple, Value, Verdict,
 };
-pub use residual::ResidualStructure;
+pub use residual::{MAY_BE, ResidualStructure};
 pub use scan::{MeasuredScene, declared_receiver};
 pub use score::Errors;
 pub use settings::Diagnosis;

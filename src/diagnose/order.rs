@@ -1,7 +1,7 @@
 //! A test of the order of the chirps: whether residuals swing with the chirp number.
 //!
-//! The residuals of the detections, at their places among the chirps, have a spectrum that is flat under a correct model:
-//! each line over its neighbours' median follows an exponential law. A line far above is a swing in time, which covariates
+//! The residuals, of silent chirps too, have at their places among the chirps a spectrum that is flat under a correct model:
+//! each line over the mean of its neighbours follows an exponential law. A line far above is a swing in time, which covariates
 //! of place and angle do not show. Chirps that share speckle have lines at the turns of the mirror, and are not tested.
 
 use std::f64::consts::LN_2;
@@ -9,7 +9,6 @@ use std::f64::consts::LN_2;
 use num_complex::Complex;
 use rustfft::FftPlanner;
 
-use super::observation::Observation;
 use super::residual::ResidualStructure;
 use super::shared::SharedSpeckle;
 use crate::effects::Shot;
@@ -17,9 +16,11 @@ use crate::effects::Shot;
 /// Lines on either side of one that its level is taken from, but for the nearest.
 const AROUND: usize = 60;
 const NEAREST: usize = 2;
-/// Chance of the strongest of all lines below which it is reported. The level has an error of its own.
-const CHANCE: f64 = 1e-5;
-/// Most places per detection: beyond them chirps are too few in their order.
+/// Variance of a mean of exponential numbers over that of their mean by the median.
+const OF_MEDIAN: f64 = 0.48;
+/// Chance of the strongest of all lines below which it is reported.
+const CHANCE: f64 = 1e-4;
+/// Most places per chirp on the target: beyond them chirps are too few in their order.
 const MOST_PLACES: usize = 64;
 /// Largest residual that counts, in standard deviations.
 const MOST: f64 = 3.5;
@@ -28,52 +29,63 @@ const MOST: f64 = 3.5;
 pub(super) fn swing(
     z: &[f64],
     shots: &[Shot],
-    observations: &[Observation],
     shared: &SharedSpeckle,
     sd_db: f64,
 ) -> Option<ResidualStructure> {
     if shared.is_any() {
         return None;
     }
-    let seen = shots.iter().zip(observations).zip(z);
-    let seen = seen.filter(|((_, observation), _)| observation.power_w.is_some());
-    let detected: Vec<(u32, f64)> =
-        seen.map(|((shot, _), z)| (shot.chirp, z.clamp(-MOST, MOST))).collect();
-    let count = detected.len() as f64;
-    let mean = detected.iter().map(|(_, z)| z).sum::<f64>() / count;
-    let first = detected.iter().map(|(chirp, _)| *chirp).min()?;
-    let last = detected.iter().map(|(chirp, _)| *chirp).max()?;
+    let count = z.len() as f64;
+    let inner: Vec<f64> = z.iter().map(|z| z.clamp(-MOST, MOST)).collect();
+    let mean = inner.iter().sum::<f64>() / count;
+    let first = shots.iter().map(|shot| shot.chirp).min()?;
+    let last = shots.iter().map(|shot| shot.chirp).max()?;
     let places = (last - first) as usize + 1;
-    if places > MOST_PLACES * detected.len() {
+    if places > MOST_PLACES * shots.len() {
         return None;
     }
     let mut signal = vec![Complex::from(0.0); places];
-    for (chirp, z) in &detected {
-        signal[(chirp - first) as usize] += z - mean;
+    for (shot, z) in shots.iter().zip(&inner) {
+        signal[(shot.chirp - first) as usize] += z - mean;
     }
     FftPlanner::new().plan_fft_forward(places).process(&mut signal);
+    // Neither the mean nor the highest line of an even number of places, which is real.
     let lines: Vec<f64> =
-        signal.iter().skip(1).take(places / 2).map(|line| line.norm_sqr() / count).collect();
-    let over = |line: usize| {
+        signal.iter().skip(1).take((places - 1) / 2).map(|line| line.norm_sqr() / count).collect();
+    if lines.len() <= 2 * AROUND {
+        return None;
+    }
+    let found = (0..lines.len()).map(|line| Line::of(&lines, line));
+    let strongest = found.min_by(|a, b| a.chance.total_cmp(&b.chance))?;
+    let p_value = (lines.len() as f64 * strongest.chance).min(1.0);
+    // A swing of amplitude a in z has a line of n·a²/4.
+    let strength_db = sd_db * (2.0 * (strongest.power - strongest.level).max(0.0) / count).sqrt();
+    let covariate = "order of the chirps".to_owned();
+    (p_value < CHANCE).then_some(ResidualStructure { covariate, strength_db, p_value })
+}
+
+/// A line of the spectrum.
+struct Line {
+    power: f64,
+    /// Mean power of its neighbours, by their median.
+    level: f64,
+    /// Probability of as much power by chance.
+    chance: f64,
+}
+
+impl Line {
+    fn of(lines: &[f64], line: usize) -> Line {
         let around = (line.saturating_sub(AROUND)..(line + AROUND + 1).min(lines.len()))
             .filter(|other| other.abs_diff(line) > NEAREST);
         let mut levels: Vec<f64> = around.map(|other| lines[other]).collect();
         let middle = levels.len() / 2;
         let (_, median, _) = levels.select_nth_unstable_by(middle, f64::total_cmp);
-        (lines[line], lines[line] * LN_2 / median.max(f64::MIN_POSITIVE))
-    };
-    if lines.len() <= 2 * AROUND {
-        return None;
+        let level = median.max(f64::MIN_POSITIVE) / LN_2;
+        // The level of m lines by their median is as uncertain as a mean of 0.48·m.
+        let known = OF_MEDIAN * levels.len() as f64;
+        let chance = (-known * (lines[line] / level / known).ln_1p()).exp();
+        Line { power: lines[line], level, chance }
     }
-    let [power, ratio] = (0..lines.len())
-        .map(over)
-        .max_by(|a, b| a.1.total_cmp(&b.1))
-        .map(|(power, ratio)| [power, ratio])?;
-    let p_value = (lines.len() as f64 * (-ratio).exp()).min(1.0);
-    // A swing of amplitude a in z has a line of n·a²/4.
-    let strength_db = sd_db * (2.0 * (power - power / ratio).max(0.0) / count).sqrt();
-    let covariate = "order of the chirps".to_owned();
-    (p_value < CHANCE).then_some(ResidualStructure { covariate, strength_db, p_value })
 }
 
 #[cfg(test)]
@@ -83,22 +95,18 @@ mod tests {
     use crate::radar::random::{Key, Purpose};
     use crate::radar::{Chirps, Radar};
 
-    /// The swing that is found in residuals of so many standard deviations with a period of so many chirps; each fifth
-    /// chirp is silent.
+    /// The swing that is found in residuals with one of this amplitude and a period in chirps.
     fn found(amplitude: f64, period: f64, seed: u64) -> Option<ResidualStructure> {
         let radar = Radar::default();
         let chirps = Chirps::draw(&radar, |_| Err("no file".to_owned())).unwrap();
         let shots: Vec<Shot> = (0..4000).map(|index| Shot::missed(&chirps, index, 0.0)).collect();
-        let seen =
-            |index: usize| Observation { power_w: (!index.is_multiple_of(5)).then_some(1e-9), range_m: None };
-        let observations: Vec<Observation> = (0..shots.len()).map(seen).collect();
         let z = |index: usize| {
             let key = Key { seed, chirp: index as u64, sub_ray: 0, purpose: Purpose::Fit };
             let phase = std::f64::consts::TAU * index as f64 / period;
             key.draws().gaussian() + amplitude * phase.sin()
         };
         let z: Vec<f64> = (0..shots.len()).map(z).collect();
-        swing(&z, &shots, &observations, &ALONE, 2.3)
+        swing(&z, &shots, &ALONE, 2.3)
     }
 
     #[test]
@@ -109,6 +117,16 @@ mod tests {
             let share = swing.strength_db / (2.3 * 0.2 / 2f64.sqrt());
             assert!((0.6..1.2).contains(&share), "{period}: {swing:?}");
         }
-        assert!((10..60).all(|seed| found(0.0, 10.0, seed).is_none()));
+        assert!((10..110).all(|seed| found(0.0, 10.0, seed).is_none()));
+    }
+
+    #[test]
+    fn few_chirps_or_chirps_far_apart_have_no_order() {
+        assert!(swing(&[], &[], &ALONE, 2.3).is_none());
+        let radar = Radar::default();
+        let chirps = Chirps::draw(&radar, |_| Err("no file".to_owned())).unwrap();
+        let apart: Vec<Shot> =
+            [0, u32::MAX].map(|chirp| Shot { chirp, ..Shot::missed(&chirps, 0, 0.0) }).to_vec();
+        assert!(swing(&[3.0, -3.0], &apart, &ALONE, 2.3).is_none());
     }
 }

@@ -39,10 +39,13 @@ const SKEWED_BY_CHANCE: f64 = 1e-6;
 /// Least error by steps of the power that is reported, dB.
 const LEAST_STEPS_DB: f64 = 0.1;
 
+/// Beginning of the name of what may be an effect.
+pub const MAY_BE: &str = "may be ";
+
 /// Structure that a model does not explain.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ResidualStructure {
-    /// The covariate it depends on; `spread` where the scatter differs everywhere, `spread over …` where the scatter,
+    /// The covariate it depends on; [`MAY_BE`] and an effect that a stronger one may hide; `spread` where the scatter differs everywhere, `spread over …` where the scatter,
     /// and not the level, depends on a covariate.
     pub covariate: String,
     /// Root mean square over the shots beyond chance, dB.
@@ -216,7 +219,7 @@ pub(super) fn steps(observations: &[Observation]) -> Option<ResidualStructure> {
 /// An effect that may be real beside a stronger one: its size, dB, and its held-out gain in standard errors.
 pub(super) fn may_be(effect: &str, strength_db: f64, errors: f64) -> ResidualStructure {
     let p_value = 0.5 * erfc(errors / SQRT_2);
-    ResidualStructure { covariate: format!("may be {effect}"), strength_db, p_value }
+    ResidualStructure { covariate: format!("{MAY_BE}{effect}"), strength_db, p_value }
 }
 
 /// Structure of the means that a field has found: the covariates with the largest parts.

@@ -206,8 +206,8 @@ impl Scorer<'_> {
 
     /// The swing of residuals with the chirp number.
     pub fn swing(&self, prediction: &Prediction, z: &[f64]) -> Option<ResidualStructure> {
-        let Problem { shots, observations, shared, .. } = self.problem;
-        order::swing(z, shots, observations, shared, speckle_sd_db(prediction.receiver.looks))
+        let Problem { shots, shared, .. } = self.problem;
+        order::swing(z, shots, shared, speckle_sd_db(prediction.receiver.looks))
     }
 
     /// The structure too fine for a field that neighbours in place or in time share beside a model, dB; 0 where chance

@@ -2,7 +2,8 @@
 //!
 //! Beams that overlap see the same scatterers, so that the effective number of observations is below that of the chirps. How much
 //! they share is read from the residuals of the fitted model, whatever the radar declares: their correlation ρ over distance
-//! in the target plane, less that at two to three spots, which a missing effect leaves and speckle does not. A
+//! in the target plane, less that at two to three spots, which a missing effect leaves and speckle does not. Ever nearer
+//! places must share nearly all, as speckle does: a missing effect is a part of the scatter only. A
 //! chirp then counts in the likelihood as 1/Σρ over itself and its neighbours. The score of a mean that changes slowly
 //! over a spot has the variance Σᵢ wᵢ·Σⱼ wⱼρᵢⱼ ≈ Σ wᵢ, as much as its curvature says, so that gains and standard
 //! deviations keep their meaning (Varin, Reid & Firth 2011, "An overview of composite likelihood methods").
@@ -33,6 +34,8 @@ const AT_ONE_PLACE: f64 = 0.55;
 /// Widths of the correlation that are tried, in spots.
 const WIDTHS: std::ops::RangeInclusive<u32> = 2..=16;
 const WIDTH_STEP: f64 = 0.1;
+/// Share of a determinant below which it is rounding.
+const SINGULAR: f64 = 1e-12;
 /// Largest residual that counts, in standard deviations: a small bright place is not speckle.
 const MOST: f64 = 2.5;
 
@@ -207,11 +210,14 @@ fn correlations(z: &[Option<f64>], neighbours: &Neighbours, lag_m: f64) -> Vec<f
         .collect()
 }
 
-/// The correlation of places that lie ever closer, by a kernel a·exp(−2d²/w²) + b of the likeliest width. `measured`:
-/// distance in spots, correlation and number of pairs.
+/// The correlation of places that lie ever closer, by a kernel a·exp(−2d²/w²) + b of the width that fits best. `measured`:
+/// distance in spots, correlation and number of pairs, from the nearest on.
 fn at_one_place(measured: &[[f64; 3]]) -> f64 {
     let mut best = (f64::INFINITY, 0.0);
-    for width in WIDTHS.map(|width| WIDTH_STEP * f64::from(width)) {
+    // A kernel narrower than the nearest neighbours are apart would tell nothing.
+    let nearest = measured.first().map_or(0.0, |[apart, ..]| *apart);
+    let widths = WIDTHS.map(|width| WIDTH_STEP * f64::from(width));
+    for width in widths.filter(|width| *width >= nearest) {
         let kernel = |apart: f64| (-2.0 * (apart / width).powi(2)).exp();
         // Least squares of a and b.
         let mut sums = [0.0; 6];
@@ -222,7 +228,7 @@ fn at_one_place(measured: &[[f64; 3]]) -> f64 {
         }
         let [n, k, kk, s, ks, ss] = sums;
         let determinant = n * kk - k * k;
-        if determinant <= 1e-12 * n * kk {
+        if determinant <= SINGULAR * n * kk {
             continue;
         }
         let a = (n * ks - k * s) / determinant;
@@ -315,6 +321,13 @@ mod tests {
         let leaning: Vec<f64> =
             field(0.0, 3).iter().enumerate().map(|(index, z)| z + slope(index)).collect();
         assert_eq!(found(&leaning), ALONE);
+        // What is missing is a third of the scatter, or shared speckle is most of it.
+        let [third, most] = [(0.3f64, 0.7f64), (0.8, 0.2)].map(|(shared, own)| {
+            let both = field(0.0136, 5).into_iter().zip(field(0.0, 6));
+            let z: Vec<f64> = both.map(|(a, b)| shared.sqrt() * a + own.sqrt() * b).collect();
+            found(&z)
+        });
+        assert!(third == ALONE && most.is_any());
         // A patch of 5 cm that is four standard deviations brighter.
         let bright = |index: usize| index % SIDE < 8 && index / SIDE < 8;
         let patched: Vec<f64> = (field(0.0, 4).iter().enumerate())

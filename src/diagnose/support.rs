@@ -21,8 +21,10 @@ const SHARE_BESIDE_FIELD: f64 = 0.5;
 const MOST_SHARED: f64 = 0.35;
 /// Share of its gain that an effect of one small place keeps where it is held out.
 const SHARE_KEPT: f64 = 0.6;
-/// Gain of such an effect, in least gains, and any held-out gain in standard errors, that leaves no doubt.
+/// Gain of such an effect, in least gains.
 const FAR_BEYOND: f64 = 4.0;
+/// Standard errors of a held-out gain that leaves no doubt.
+const NO_DOUBT: f64 = 4.0;
 
 /// What speaks for an effect.
 pub(super) struct Claim {
@@ -48,7 +50,7 @@ impl Claim {
     /// Whether held-out patches gain so much that larger errors of the powers do not speak against the effect: it explains
     /// ranges or silence, and the powers by a form that is not quite its own.
     fn is_far_beyond_errors(&self) -> bool {
-        self.counts() > FAR_BEYOND * self.held_out[1]
+        self.counts() > NO_DOUBT * self.held_out[1]
     }
 
     /// Whether fit, held-out patches and size support the effect, on a scan of this many independent shots.

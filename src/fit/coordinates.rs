@@ -96,11 +96,6 @@ impl Coordinate {
         self.scale.value(searched).clamp(self.min, self.max)
     }
 
-    /// Whether the coordinate is one of the two levels of a mixture.
-    pub fn is_level(&self) -> bool {
-        self.name == SPECULAR_LEVEL || self.name == DIFFUSE_LEVEL
-    }
-
     /// Whether the coordinate is of the diffuse part of a mixture.
     fn is_diffuse(&self) -> bool {
         self.name.starts_with("diffuse.") || self.name == DIFFUSE_LEVEL
@@ -121,14 +116,18 @@ impl Coordinate {
         [self.searched(self.min), self.searched(self.max)]
     }
 
-    /// Ends of the range, in the search, in which a start is sought: of a permittivity, on either side of zero, those of
-    /// matter. Far beyond, all mirrors reflect alike, and a search finds no way back.
+    /// Ends of the range, in the search, in which a start is sought: of a permittivity those of dielectrics. Far beyond, all
+    /// mirrors reflect alike, and a search finds no way back.
     pub fn usual_ends(&self) -> [f64; 2] {
         /// Permittivities of what hardly reflects, and of what reflects nearly all.
         const OF_MATTER: [f64; 2] = [1.02, 300.0];
         let [lower, upper] = self.ends();
         match self.scale {
-            Scale::Asinh => OF_MATTER.map(|value| self.searched(value).clamp(lower, upper)),
+            Scale::Asinh => {
+                let [low, high] = OF_MATTER.map(|value| self.searched(value).clamp(lower, upper));
+                // Bounds may leave out all of it.
+                if low < high { [low, high] } else { [lower, upper] }
+            }
             Scale::Linear | Scale::Log { .. } => [lower, upper],
         }
     }

@@ -23,6 +23,8 @@ const NEAR: f64 = 1.0;
 /// Steps with the second derivatives themselves, where the products of the scores do not arrive: of few rows they are a
 /// poor guide. They promise less than this at the end.
 const POLISH: Minimise = Minimise { iterations: 40, tolerance: 1e-5, patience: usize::MAX };
+/// Least second derivative that counts, as a share of the largest.
+const LEAST_BEND: f64 = 1e-12;
 /// Least squares ends when a step promises to lower the cost by less; its parameters are compared with other programs.
 const SQUARES_TOLERANCE: f64 = 1e-8;
 /// Loss of cost that still counts as the same optimum.
@@ -188,10 +190,14 @@ fn polished(
     }
     let better = search_freely(&POLISH, coordinates, &found.at, |at| {
         let local = cost(at);
-        let mut bends = observed_information(coordinates, at, &local, &cost).symmetric_eigen();
+        let bends = observed_information(coordinates, at, &local, &cost);
+        if !local.value.is_finite() || bends.iter().any(|bend| !bend.is_finite()) {
+            return local;
+        }
+        let mut bends = bends.symmetric_eigen();
         // Where it bends down, a step as long as where it bends up as much.
         let most = bends.eigenvalues.amax();
-        bends.eigenvalues.apply(|bend| *bend = bend.abs().max(1e-12 * most));
+        bends.eigenvalues.apply(|bend| *bend = bend.abs().max(LEAST_BEND * most));
         Local { curvature: bends.recompose(), ..local }
     });
     Minimum { iterations: found.iterations + better.iterations, ..better }

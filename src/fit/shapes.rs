@@ -87,7 +87,7 @@ pub(crate) fn starts(
 }
 
 /// The numbers in which a law is not linear.
-fn shapes(coordinates: &Coordinates) -> Vec<usize> {
+pub(crate) fn shapes(coordinates: &Coordinates) -> Vec<usize> {
     let is_shape =
         |&index: &usize| coordinates.list[index].name != LOOKS && !is_level(coordinates, index);
     (0..coordinates.len()).filter(is_shape).collect()

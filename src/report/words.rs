@@ -1,6 +1,6 @@
 //! What a diagnosis found in words, for the terminal and for the page.
 
-use crate::diagnose::{FoundEffect, Parameters, Report, Triple, Value, Verdict};
+use crate::diagnose::{FoundEffect, MAY_BE, Parameters, Report, Triple, Value, Verdict};
 use crate::effects::{Level, find};
 use crate::formats::words::{digits, in_unit, listed, plus_minus};
 
@@ -130,7 +130,7 @@ pub(super) fn covariate(name: &str) -> (String, &'static str) {
         let hint = "The powers scatter more or less than declared there: speckle, noise or tilts.";
         return (format!("scatter over {inner}"), hint);
     }
-    if let Some(effect) = name.strip_prefix("may be ") {
+    if let Some(effect) = name.strip_prefix(MAY_BE) {
         let hint = "Beside the strongest effect it may be real, or make up for an error of that one's form.";
         return (format!("what may be {effect}"), hint);
     }

@@ -51,6 +51,8 @@ impl Diameter {
 const RAYS: usize = 160;
 /// Radii of the first and of the last ray, m.
 const RADII_M: [f64; 2] = [2.5e-4, 0.18];
+/// The narrowest spot that differs from a ray, m: the first ray of the spiral is well within it.
+const LEAST_M: f64 = 1e-3;
 /// The widest spot, m. The last ray is three standard deviations of its two-way weight from its middle.
 const MOST_M: f64 = 0.2;
 /// Diameter at half the intensity exp(−2r²/w²) over the radius w: √(2 ln 2).
@@ -63,7 +65,10 @@ const LEAST_WEIGHT: f64 = 1e-4;
 /// Beyond it they have moved the shot to another surface, and the spot keeps the power of the old one.
 const MOST_GAIN: f64 = 100.0;
 
-/// Terms of laws whose sums are kept: more than the regions of most scenes have.
+// A ray's number is a byte.
+const _: () = assert!(RAYS <= 256);
+
+/// Terms of laws whose sums are kept, for the few diameters that a search compares.
 const MOST_TERMS: usize = 48;
 
 /// Where one ray of a spot hits the target.
@@ -277,7 +282,7 @@ fn shaded(survey: &Survey, laws: &[Brdf]) -> Survey {
 fn average(diameter: Diameter, shaded: &Survey, arrived: &mut [Option<MeanEcho>]) {
     let Some(shaded) = shaded.downcast_ref::<ShadedSpots>() else { return };
     let answers = shaded.answers(diameter);
-    for (shot, one) in arrived.iter_mut().enumerate() {
+    arrived.par_iter_mut().enumerate().for_each(|(shot, one)| {
         let sums = answers.iter().filter_map(|(level, of)| Some((*level, of.get(shot)?)));
         let sums = sums.fold(Sums::default(), |sums, (level, of)| sums.and(level, of));
         if let (Some(one), Some(averaged)) = (one, sums.averaged()) {
@@ -286,7 +291,7 @@ fn average(diameter: Diameter, shaded: &Survey, arrived: &mut [Option<MeanEcho>]
             one.range_m += averaged.longer_m;
             one.spread_m = one.spread_m.hypot(averaged.spread_m);
         }
-    }
+    });
 }
 
 /// One ray of the spot of a beam, where it hits; `facets` may be empty.
@@ -386,7 +391,7 @@ impl Effect for FiniteSpot {
     }
 
     fn survey_key(&self, values: &[f64]) -> Option<Vec<f64>> {
-        values.first().filter(|diameter_m| **diameter_m > 0.0).map(|_| Vec::new())
+        values.first().filter(|diameter_m| **diameter_m >= LEAST_M).map(|_| Vec::new())
     }
 
     fn survey(&self, _: &[f64], stage: &Stage, shots: &[Shot]) -> Survey {
@@ -452,6 +457,33 @@ mod tests {
             // Over the spot the angle still changes by 2 mrad, on a lobe of 0.2.
             assert!(db(with.power_w / bare.power_w).abs() < 0.01);
             assert!((with.range_m - bare.range_m).abs() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn a_spot_of_almost_no_width_is_a_ray() {
+        let bench = Bench::sphere();
+        for diameter_m in [1e-9, 1e-5, 0.9e-3] {
+            assert_eq!(bench.with(&FiniteSpot, &[diameter_m]), bench.bare(), "{diameter_m}");
+        }
+        let sum: f64 = weights(LEAST_M).iter().sum();
+        assert!((sum - 1.0).abs() < 1e-12);
+        for (narrow, bare) in bench.with(&FiniteSpot, &[LEAST_M]).iter().zip(bench.bare()) {
+            assert!(db(narrow.power_w / bare.power_w).abs() < 0.1, "{narrow:?} {bare:?}");
+        }
+    }
+
+    /// The diameter of the beam at 8 m, where it has its waist, is that of the radar.
+    #[test]
+    fn the_spot_of_the_beam_is_one_of_its_diameter() {
+        let bench = Bench::sphere();
+        let diameter_m = bench.stage().geometry.radar.spot_fwhm_m();
+        let own = bench.with(&BeamSpot { diameter_m }, &[]);
+        let given = bench.with(&FiniteSpot, &[diameter_m]);
+        for (shot, (own, given)) in bench.shots.iter().zip(own.iter().zip(given)) {
+            // Off the middle of the field the beam is wider.
+            let near = if shot.xt_m.hypot(shot.yt_m) < 0.05 { 0.05 } else { 1.0 };
+            assert!(db(own.power_w / given.power_w).abs() < near, "{own:?} {given:?}");
         }
     }
 
