@@ -335,8 +335,8 @@ fn nothing_detected_and_scenes_that_no_diagnosis_predicts_are_said() {
     assert_eq!(json(&at.join("report/report.json"))["verdict"], "cannot-tell");
     let scene = fs::read_to_string(at.join("scene.toml")).unwrap();
     for (more, way_out) in [
-        ("[spot]\nrays = 16\n", "`finite-spot`"),
-        ("[bounce]\n", "`multi-bounce`"),
+        ("[bounce]\noutside_spot_db = -30\n", "`multi-bounce`"),
+        ("[bounce]\nin_phase = true\n", "`multi-bounce`"),
         ("[radar.receiver]\n", "[radar.noise]"),
     ] {
         fs::write(at.join("more.toml"), format!("{scene}\n{more}")).unwrap();

@@ -112,9 +112,9 @@ mod tests {
     #[test]
     fn a_swing_is_found_with_its_strength_and_noise_is_none() {
         for (seed, period) in [(1, 7.3), (2, 310.0), (3, 1500.0)] {
-            let swing = found(0.2, period, seed).unwrap();
+            let swing = found(0.25, period, seed).unwrap();
             // A period that does not divide the scan loses up to two thirds of its line to others.
-            let share = swing.strength_db / (2.3 * 0.2 / 2f64.sqrt());
+            let share = swing.strength_db / (2.3 * 0.25 / 2f64.sqrt());
             assert!((0.6..1.2).contains(&share), "{period}: {swing:?}");
         }
         assert!((10..110).all(|seed| found(0.0, 10.0, seed).is_none()));

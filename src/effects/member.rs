@@ -12,7 +12,7 @@ use crate::brdf::Brdf;
 use crate::frames::{Global, Pose};
 
 /// Most parameters of an effect that has members.
-const MOST: usize = 8;
+const MOST: usize = 10;
 
 /// An effect with some of its parameters.
 struct Member {
