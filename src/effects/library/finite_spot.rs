@@ -468,12 +468,12 @@ mod tests {
         }
         let sum: f64 = weights(LEAST_M).iter().sum();
         assert!((sum - 1.0).abs() < 1e-12);
-        // But for silhouettes, where a millimetre of the ball is steep.
+        // But near edges of facets, which a millimetre may pass over.
         let narrow = bench.with(&FiniteSpot, &[LEAST_M]);
         let off_db = narrow.iter().zip(bench.bare()).map(|(a, b)| db(a.power_w / b.power_w).abs());
         let mut off_db: Vec<f64> = off_db.collect();
         off_db.sort_by(f64::total_cmp);
-        assert!(off_db[off_db.len() * 9 / 10] < 0.1, "{off_db:?}");
+        assert!(off_db[off_db.len() / 2] < 0.02, "{off_db:?}");
     }
 
     /// The diameter of the beam at 8 m, where it has its waist, is that of the radar.
