@@ -24,7 +24,7 @@ const UNLIKE: f64 = 12.0;
 /// Difference from their law from which false alarms are something else, and the size that each then stands for, dB.
 const OFF_THEIR_LAW: f64 = 2.3;
 const OUTLYING_DB: f64 = 10.0;
-/// Gain in ln likelihood by which false alarms tell a level of noise.
+/// Gain in ln likelihood from which on false alarms determine another level of noise.
 const TOLD: f64 = 5.0;
 /// Levels of noise that are tried, dB over the model's.
 const LEVELS_DB: std::ops::RangeInclusive<i32> = -12..=12;

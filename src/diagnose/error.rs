@@ -125,7 +125,7 @@ pub enum DiagnoseError {
     },
     /// Searches of the scattering models find ever better fits.
     #[error(
-        "the search failed: time and again the scattering models fit better from another start, the last time by \
+        "the search failed: from each new start the scattering models fit better, the last time by \
          {gain:.1} in ln p; give the materials laws nearer to the data, such as one fitted to a curve of this cloud \
          by `matdb measure` and `matdb fit`"
     )]

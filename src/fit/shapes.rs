@@ -49,23 +49,6 @@ pub(crate) fn starts(
     let (lower, upper) = (coordinates.lower(), coordinates.upper());
     let usual: Vec<[f64; 2]> = coordinates.list.iter().map(Coordinate::usual_ends).collect();
     let places = MOST.min(PER_SHAPE.saturating_pow(shapes.len() as u32));
-    let ranked = |found: Vec<Minimum>| {
-        let mut found = found;
-        found.retain(|one| one.local.value.is_finite());
-        found.sort_by(|a, b| a.local.value.total_cmp(&b.local.value));
-        let mut apart: Vec<DVector<f64>> = Vec::new();
-        for Minimum { at, .. } in found {
-            let is_near = |other: &DVector<f64>| {
-                shapes
-                    .iter()
-                    .all(|&i| (at[i] - other[i]).abs() < NEAR * (usual[i][1] - usual[i][0]))
-            };
-            if !apart.iter().any(is_near) {
-                apart.push(at);
-            }
-        }
-        apart
-    };
     let tried = (0..places).into_par_iter().map(|place| {
         let mut start = coordinates.start();
         for (&index, share) in shapes.iter().zip(evenly(place, shapes.len())) {
@@ -78,12 +61,28 @@ pub(crate) fn starts(
         }
         LEVELS.run(&start, [&low, &high], &cost)
     });
-    let mut best = ranked(tried.collect());
+    let mut best = best_apart(tried.collect(), &shapes, &usual);
     best.truncate(FOLLOWED * count);
     let followed = best.into_par_iter().map(|at| SHORT.run(&at, [&lower, &upper], &cost));
-    let mut starts = ranked(followed.collect());
+    let mut starts = best_apart(followed.collect(), &shapes, &usual);
     starts.truncate(count);
     starts
+}
+
+/// The ends of some searches, best first, without those whose shapes are near a better one's.
+fn best_apart(mut found: Vec<Minimum>, shapes: &[usize], usual: &[[f64; 2]]) -> Vec<DVector<f64>> {
+    found.retain(|one| one.local.value.is_finite());
+    found.sort_by(|a, b| a.local.value.total_cmp(&b.local.value));
+    let mut apart: Vec<DVector<f64>> = Vec::new();
+    for Minimum { at, .. } in found {
+        let is_near = |&i: &usize, other: &DVector<f64>| {
+            (at[i] - other[i]).abs() < NEAR * (usual[i][1] - usual[i][0])
+        };
+        if !apart.iter().any(|other| shapes.iter().all(|i| is_near(i, other))) {
+            apart.push(at);
+        }
+    }
+    apart
 }
 
 /// The numbers in which a law is not linear.

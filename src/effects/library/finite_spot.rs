@@ -24,7 +24,7 @@ pub(crate) struct FiniteSpot;
 /// The spot of the radar's own beam, which a scene with several rays in a spot has. It has no number to be found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct BeamSpot {
-    /// Its largest diameter at half the intensity, m.
+    /// Its diameter at half the intensity in the middle of the field, m. Each shot is averaged over the beam where it is.
     pub diameter_m: f64,
 }
 
@@ -55,8 +55,6 @@ const RADII_M: [f64; 2] = [2.5e-4, 0.18];
 const LEAST_M: f64 = 1e-3;
 /// The widest spot, m. The last ray is three standard deviations of its two-way weight from its middle.
 const MOST_M: f64 = 0.2;
-/// Diameter at half the intensity exp(−2r²/w²) over the radius w: √(2 ln 2).
-const FWHM_OVER_RADIUS: f64 = 1.177_410_022_515_474_7;
 /// How far off its axis a spot detects a target, in diameters: to where the intensity is 19 dB down.
 const OUTER: f64 = 1.25;
 /// Least weight of a ray that counts, as a share of the largest.
@@ -266,7 +264,7 @@ fn spots(stage: &Stage, shots: &[Shot]) -> Spots {
         .collect();
     let of_beam = beams.iter().zip(&centres).map(|(beam, centre)| {
         let range_m = centre.as_ref().map_or(beam.focus_m, |hit| hit.range_m);
-        beam.section(range_m).radius_m * FWHM_OVER_RADIUS
+        beam.section(range_m).fwhm_m()
     });
     Spots { all, of_beam_m: of_beam.collect(), sums: Cache::default() }
 }
