@@ -35,8 +35,10 @@ class State:
 
     def theta(self):
         if np.ndim(self.tilt) == 2:
-            slope = np.tan(self.clean_theta())
-            return np.arctan(np.hypot(slope + self.tilt[:, 0], self.tilt[:, 1]))
+            # the normal turned about two of its tangents, one in the plane of incidence; behind the horizon nothing returns
+            theta, (along, across) = self.clean_theta(), np.tan(np.clip(self.tilt, -1.5, 1.5)).T
+            cosine = np.cos(theta) + along * np.sin(theta)
+            return np.arccos(np.clip(cosine / np.sqrt(1 + along**2 + across**2), 0.01, 1))
         return self.clean_theta()
 
     def clean_theta(self):

@@ -101,8 +101,10 @@ fn found(
 ) -> FoundEffect {
     let place = effect.place(values);
     let mut numbers = std::collections::BTreeMap::new();
-    for ((known, &value), sd) in effect.parameters().iter().zip(values).zip(sd) {
-        let sd = finite(sd * known.step);
+    for (number, ((known, &value), sd)) in
+        effect.parameters().iter().zip(values).zip(sd).enumerate()
+    {
+        let sd = finite((sd * known.step).hypot(effect.form_error(number) * value));
         numbers.insert(known.name, Value { value, sd, unit: known.unit });
     }
     FoundEffect {

@@ -181,20 +181,24 @@ fn add_best<'a>(search: &Search, model: &mut Explanation<'a>, trials: &mut [Tria
             tied.push(other);
         }
     }
-    let against = |one: &Contender| {
+    // Laws far from those stored may be as likely as near ones: each is judged by the nearer.
+    let mut settled = Vec::new();
+    for one in tied {
         let Trial { space, fit, .. } = &trials[one.trial];
-        space.against(&fit.at)
-    };
-    let least = tied.iter().map(|one| against(one)).fold(f64::INFINITY, f64::min);
-    let best = tied.iter().find(|one| against(one) < least + EVEN);
-    let best = best.map_or(first, |best| *best);
+        let (space, fit) = (space.clone(), fit.clone());
+        let state = scorer.settle(&model.state, space, fit, one.held_out.clone());
+        settled.push((one.trial, state.space.against(&state.fit.at), state));
+    }
+    let least = settled.iter().map(|one| one.1).fold(f64::INFINITY, f64::min);
+    let best = settled.iter().find(|one| one.1 < least + EVEN).map_or(first.trial, |one| one.0);
     // Of its family the simplest member.
-    let name = trials[best.trial].candidate.name;
-    let family = tied.iter().filter(|one| trials[one.trial].candidate.name == name);
-    let best =
-        family.min_by_key(|one| trials[one.trial].candidate.numbers).map_or(best, |one| *one);
+    let name = trials[best].candidate.name;
+    let numbers = |trial: usize| trials[trial].candidate.numbers;
+    let family = settled.iter().map(|one| one.0);
+    let family = family.filter(|trial| trials[*trial].candidate.name == name);
+    let best = family.min_by_key(|trial| numbers(*trial)).unwrap_or(best);
     let mut class: Vec<&'static str> = Vec::new();
-    for other in tied.iter().map(|one| trials[one.trial].candidate.name) {
+    for other in settled.iter().map(|one| trials[one.0].candidate.name) {
         if other != name && !class.contains(&other) {
             class.push(other);
         }
@@ -206,11 +210,13 @@ fn add_best<'a>(search: &Search, model: &mut Explanation<'a>, trials: &mut [Tria
         .take(MOST_RIVALS)
         .map(|one| trials[one.trial].effect)
         .collect();
-    let trial = &mut trials[best.trial];
-    trial.candidate.accepted = true;
-    model.added.push(Addition { class, evidence: Evidence::from(&trial.candidate), rivals });
-    let (space, fit) = (trial.space.clone(), trial.fit.clone());
-    model.state = scorer.settle(&model.state, space, fit, best.held_out.clone());
+    let candidate = &mut trials[best].candidate;
+    candidate.accepted = true;
+    model.added.push(Addition { class, evidence: Evidence::from(&*candidate), rivals });
+    model.state = settled
+        .into_iter()
+        .find(|one| one.0 == best)
+        .map_or_else(|| model.state.clone(), |one| one.2);
     true
 }
 

@@ -82,18 +82,28 @@ impl Folds {
     pub fn sum(&self, values: &[f64]) -> [f64; 2] {
         sum_by_cell(values, &self.cell, self.cells)
     }
+
+    /// Sum of one number per shot over each cell.
+    pub(super) fn cell_sums(&self, values: &[f64]) -> Vec<f64> {
+        sums_by_cell(values, &self.cell, self.cells)
+    }
 }
 
 /// Sum of the values, and its standard error over cells; `cell` is the cell of each value, below `cells`.
 pub(super) fn sum_by_cell(values: &[f64], cell: &[usize], cells: usize) -> [f64; 2] {
-    let mut sums = vec![0.0; cells];
-    for (value, &cell) in values.iter().zip(cell) {
-        sums[cell] += value;
-    }
+    let sums = sums_by_cell(values, cell, cells);
     let count = sums.len().max(2) as f64;
     let total: f64 = sums.iter().sum();
     let variance = sums.iter().map(|s| (s - total / count).powi(2)).sum::<f64>() / (count - 1.0);
     [total, (count * variance).sqrt()]
+}
+
+fn sums_by_cell(values: &[f64], cell: &[usize], cells: usize) -> Vec<f64> {
+    let mut sums = vec![0.0; cells];
+    for (value, &cell) in values.iter().zip(cell) {
+        sums[cell] += value;
+    }
+    sums
 }
 
 /// The square of a grid over the target plane in which a shot lies.

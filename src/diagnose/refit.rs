@@ -3,7 +3,7 @@
 //! The score of each chirp is a difference quotient of ln p. The curvature is Σ L·(y/μ)·g·gᵀ, with g the
 //! slope of ln μ, for unknowns that change means, and the sum of the products of the scores for unknowns that only
 //! change the distribution about the mean. The standard deviations come from the products of the scores at the end
-//! (Berndt, Hall, Hall & Hausman 1974).
+//! (Berndt, Hall, Hall & Hausman 1974), and from their scatter over cells of the target where that is wider.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -191,36 +191,60 @@ impl Problem<'_> {
         best.1
     }
 
-    /// Standard deviation of every unknown; infinite where a bound holds it or the data do not determine it.
-    pub fn sd(&self, space: &Space, at: &DVector<f64>) -> Vec<f64> {
+    /// Standard deviation of every unknown; infinite where a bound holds it or the data do not determine it. The larger of
+    /// that of a right model and that of a model which is off from cell to cell of the target (Huber 1967, White 1982):
+    /// B⁻¹·J·B⁻¹ with the products B of the shots' scores and those J of the cells' scores.
+    pub fn sd(&self, space: &Space, at: &DVector<f64>, folds: &Folds) -> Vec<f64> {
         let [lower, upper] = space.bounds();
         let terms = self.terms(space, at);
         let slopes = self.slopes(space, at, [&lower, &upper], &terms);
+        let beside = self.local_beside(space, at, [&lower, &upper]).curvature;
         let free: Vec<usize> =
             (0..at.len()).filter(|&i| at[i] > lower[i] && at[i] < upper[i]).collect();
-        // Powers that share speckle count for less, ranges do not. Without it both are one score.
-        let product = |(term, (a, b)): (&Term, (&Slope, &Slope))| {
+        let of_free =
+            |whole: DMatrix<f64>| (whole + &beside).select_rows(&free).select_columns(&free);
+        let of_shots = of_free(products(&terms, &slopes));
+        let of_cells = of_free(products_of_cells(&slopes, folds));
+        let of_model = deviations(&of_shots);
+        let inverse = of_shots.try_inverse().map(|inverse| &inverse * of_cells * &inverse);
+        let mut sd = vec![f64::INFINITY; at.len()];
+        for (place, (&i, of_model)) in free.iter().zip(of_model).enumerate() {
+            let over_cells =
+                inverse.as_ref().map_or(0.0, |all| all[(place, place)].max(0.0).sqrt());
+            sd[i] = of_model.map_or(f64::INFINITY, |sd| sd.max(over_cells));
+        }
+        sd
+    }
+}
+
+/// Sum of the products of the shots' scores. Powers that share speckle count for less, ranges do not. Without it both
+/// are one score.
+fn products(terms: &[Term], slopes: &[Vec<Slope>]) -> DMatrix<f64> {
+    DMatrix::from_fn(slopes.len(), slopes.len(), |i, j| {
+        let pairs = terms.iter().zip(slopes[i].iter().zip(&slopes[j]));
+        let products = pairs.map(|(term, (a, b))| {
             if term.weight == 1.0 {
                 return a.ln_p * b.ln_p;
             }
             let [power_a, power_b] = [a, b].map(|slope| slope.ln_p - slope.ln_range);
             power_a * power_b / term.weight + a.ln_range * b.ln_range
-        };
-        let beside = self.local_beside(space, at, [&lower, &upper]);
-        let mut products: DMatrix<f64> = DMatrix::zeros(free.len(), free.len());
-        for (row, &i) in free.iter().enumerate() {
-            for (column, &j) in free.iter().enumerate() {
-                let pairs = slopes[i].iter().zip(&slopes[j]);
-                let known: f64 = terms.iter().zip(pairs).map(product).sum();
-                products[(row, column)] = known + beside.curvature[(i, j)];
-            }
-        }
-        let mut sd = vec![f64::INFINITY; at.len()];
-        for (&i, found) in free.iter().zip(deviations(&products)) {
-            sd[i] = found.unwrap_or(f64::INFINITY);
-        }
-        sd
-    }
+        });
+        products.sum()
+    })
+}
+
+/// Sum of the products of the cells' scores.
+fn products_of_cells(slopes: &[Vec<Slope>], folds: &Folds) -> DMatrix<f64> {
+    let of_cells: Vec<DVector<f64>> = slopes
+        .iter()
+        .map(|slopes| {
+            let scores: Vec<f64> = slopes.iter().map(|slope| slope.ln_p).collect();
+            DVector::from_vec(folds.cell_sums(&scores))
+        })
+        .collect();
+    let cells = of_cells.first().map_or(2, |sums| sums.len().max(2)) as f64;
+    let products = |i: usize, j: usize| of_cells[i].dot(&of_cells[j]);
+    DMatrix::from_fn(slopes.len(), slopes.len(), products) * (cells / (cells - 1.0))
 }
 
 /// ln likelihood of the shots outside a fold.

@@ -109,7 +109,7 @@ fn report(
     let unknown = structure.map(|structure| prediction.as_passed(&structure.ln_factor));
     let columns = [Column { state: base, z: &z_before }, Column { state: &model.state, z: &z }];
     let unknown = &unknown.unwrap_or_default();
-    let sd = scorer.problem.sd(space, &fit.at);
+    let sd = scorer.problem.sd(space, &fit.at, scorer.folds);
     Report {
         schema: SCHEMA,
         verdict: Verdict::new(!model.added.is_empty(), !unexplained.is_empty()),

@@ -125,8 +125,10 @@ impl Scorer<'_> {
         let (start, held) = (space.restarted(&fit.at), space.costly(&fit.at));
         let again = self.problem.fit(&space, &start, &held, &SEARCH);
         let gain = again.ln_likelihood - fit.ln_likelihood;
-        let has_arrived = again.converged && !fit.converged && gain >= -SEARCH.tolerance;
-        if gain > SEARCH.tolerance || has_arrived {
+        let is_as_likely = gain >= -SEARCH.tolerance;
+        let is_nearer = space.against(&again.at) < space.against(&fit.at);
+        let has_arrived = again.converged && !fit.converged;
+        if gain > SEARCH.tolerance || is_as_likely && (has_arrived || is_nearer) {
             fit = if held.is_empty() {
                 again
             } else {

@@ -149,6 +149,11 @@ pub trait Effect: Sync {
     /// Changes the mean powers and ranges of all shots by a shaded survey. It is called after all gains.
     fn arrive(&self, _values: &[f64], _shaded: &Survey, _echoes: &mut [Option<MeanEcho>]) {}
 
+    /// How far a parameter may be off because the real effect has another form than this one, as a share of its value.
+    fn form_error(&self, _parameter: usize) -> f64 {
+        0.0
+    }
+
     /// Changes the distribution of received powers.
     fn receive(&self, _values: &[f64], receiver: Receiver) -> Receiver {
         receiver

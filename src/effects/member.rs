@@ -141,6 +141,10 @@ impl Effect for Member {
         whole!(self.arrive(values, shaded, echoes));
     }
 
+    fn form_error(&self, parameter: usize) -> f64 {
+        self.whole.form_error(self.used[parameter])
+    }
+
     fn receive(&self, values: &[f64], receiver: Receiver) -> Receiver {
         whole!(self.receive(values, receiver))
     }
