@@ -1,7 +1,5 @@
 //! The data of a diagnosis and their likelihood under a model, with its slopes by every unknown.
 
-use std::collections::{BTreeMap, BTreeSet};
-
 use nalgebra::DVector;
 use rayon::prelude::*;
 
@@ -11,11 +9,11 @@ use super::likelihood::{Likelihood, Term};
 use super::observation::{DB, Observation, ReceiverLimits};
 use super::shared::SharedSpeckle;
 use super::space::Space;
-use crate::effects::{Ceiling, Model, Prediction, PredictionCache, Receiver, Shot, Stage};
+use crate::effects::{Ceiling, Model, Prediction, PredictionCache, Receiver, Shot, Stage, Twist};
 use crate::fit::minimise::Local;
 
-/// Shift of the target in a difference quotient, m per step of an effect's parameter.
-const SHIFT_STEP_M: f64 = 2e-3;
+/// Shift, m, and turn, deg, of the target in a difference quotient, per step of an effect's parameter.
+const TWIST_STEP: Twist = [2e-3, 2e-3, 2e-3, 0.5, 0.5, 0.5];
 /// Step of a difference quotient by an effect's parameter, in steps of the parameter.
 pub(super) const EFFECT_STEP: f64 = 0.25;
 /// Chirps of a sample; more take time and add little.
@@ -78,7 +76,8 @@ impl Problem<'_> {
         let mut local = space.prior(at);
         let here = self.ln_p_of_alarms(space, at);
         local.value -= here;
-        for index in space.base_len()..at.len() {
+        let moving = space.moving();
+        for index in (space.base_len()..at.len()).filter(|index| !moving.contains(index)) {
             let ends = [EFFECT_STEP, -EFFECT_STEP].map(|by| {
                 let mut there = at.clone();
                 there[index] = (at[index] + by).clamp(lower[index], upper[index]);
@@ -141,26 +140,22 @@ impl Problem<'_> {
         let receiver = space.received(self.receiver, at);
         let is_plain = receiver.tilt_sd_rad == 0.0 && receiver.ceiling == Ceiling::NONE;
         let is_free = |index: usize| bounds[0][index] < bounds[1][index];
-        // Unknowns that shift the target along one axis share the slopes by that shift.
-        let mut axes = BTreeSet::new();
-        for index in (0..at.len()).filter(|&index| is_free(index)) {
-            axes.extend(space.shift(index, self.shots).map(|shift| shift.axis));
-        }
-        let by_shift: BTreeMap<usize, Vec<Slope>> = axes
-            .into_par_iter()
-            .map(|axis| (axis, self.slopes_by_shift(effect_step * SHIFT_STEP_M, space, at, axis)))
-            .collect();
+        // Unknowns that move the target share the slopes by small shifts and turns of it.
+        let moving: Vec<usize> = space.moving();
+        let twists = if moving.iter().any(|&index| is_free(index)) {
+            space.twists(at, self.stage, self.shots)
+        } else {
+            Vec::new()
+        };
+        let by_axis = self.slopes_by_twist(effect_step, space, at, &twists);
         (0..at.len())
             .into_par_iter()
             .map(|index| {
                 if !is_free(index) {
                     return vec![Slope::default(); self.shots.len()];
                 }
-                if let Some(shift) = space.shift(index, self.shots) {
-                    let slopes = self.shots.iter().zip(&by_shift[&shift.axis]);
-                    return slopes
-                        .map(|(shot, slope)| slope.times(shift.per_unit_m(shot)))
-                        .collect();
+                if let Some(number) = moving.iter().position(|moving| *moving == index) {
+                    return along_twists(&by_axis, &twists, number);
                 }
                 let is_law = index < space.base_len();
                 let difference = space.difference(at, bounds, index, effect_step, !is_plain);
@@ -178,17 +173,29 @@ impl Problem<'_> {
             .collect()
     }
 
-    /// Slopes of every shot by a shift of the target along an axis, per m.
-    fn slopes_by_shift(
+    /// Slopes of every shot by a shift of the target along each axis, per m, and by a turn about it, per deg; none where no
+    /// shot moves in this way.
+    fn slopes_by_twist(
         &self,
-        step_m: f64,
+        effect_step: f64,
         space: &Space,
         at: &DVector<f64>,
-        axis: usize,
-    ) -> Vec<Slope> {
-        let [more, less] = [step_m, -step_m]
-            .map(|by_m| self.terms_of(&space.model(self.receiver, at).shifted(axis, by_m)));
-        quotients(&more, &less, 2.0 * step_m)
+        twists: &[Vec<Twist>],
+    ) -> [Vec<Slope>; 6] {
+        let slopes = (0..6).into_par_iter().map(|axis| {
+            if twists.iter().flatten().all(|twist| twist[axis] == 0.0) {
+                return Vec::new();
+            }
+            let step = effect_step * TWIST_STEP[axis];
+            let [more, less] = [step, -step].map(|by| {
+                let mut twist = Twist::default();
+                twist[axis] = by;
+                self.terms_of(&space.model(self.receiver, at).twisted(twist))
+            });
+            quotients(&more, &less, 2.0 * step)
+        });
+        let slopes: Vec<Vec<Slope>> = slopes.collect();
+        slopes.try_into().unwrap_or_default()
     }
 
     /// Slopes of ln mean before the receiver by every unknown that changes it. Unlike [`Term::ln_mean`]
@@ -229,7 +236,26 @@ pub(super) struct Slope {
     pub range_m: f64,
 }
 
+/// Slopes of every shot by one of the unknowns that move the target, from those by shifts and turns.
+fn along_twists(by_axis: &[Vec<Slope>; 6], twists: &[Vec<Twist>], number: usize) -> Vec<Slope> {
+    let of_shot = |(shot, twists): (usize, &Vec<Twist>)| {
+        let axes = by_axis.iter().zip(twists[number]).filter(|(_, by)| *by != 0.0);
+        let parts = axes.map(|(slopes, by)| slopes[shot].times(by));
+        parts.fold(Slope::default(), Slope::plus)
+    };
+    twists.iter().enumerate().map(of_shot).collect()
+}
+
 impl Slope {
+    fn plus(self, other: Slope) -> Slope {
+        Slope {
+            ln_p: self.ln_p + other.ln_p,
+            ln_range: self.ln_range + other.ln_range,
+            ln_mean: self.ln_mean + other.ln_mean,
+            range_m: self.range_m + other.range_m,
+        }
+    }
+
     fn times(self, by: f64) -> Slope {
         let Slope { ln_p, ln_range, ln_mean, range_m } = self;
         let (ln_p, ln_range) = (by * ln_p, by * ln_range);

@@ -11,8 +11,7 @@ use rayon::prelude::*;
 use super::observation::Observation;
 use super::problem::Problem;
 use super::space::Space;
-use crate::effects::{Effect, Shot};
-use crate::frames::{Global, Pose};
+use crate::effects::{Effect, Shot, Twist, way_m};
 use crate::measure::icp::bulk_sd_m;
 
 /// Most rounds of tracing.
@@ -21,8 +20,6 @@ const ROUNDS: usize = 12;
 const ARRIVED: f64 = 0.01;
 /// Where the weight of a range ends, in standard deviations: Tukey's biweight with 95 % efficiency.
 const BIWEIGHT: f64 = 4.685;
-/// Step of the difference quotient of a surface point's motion, in steps of the parameters.
-const STEP: f64 = 1e-3;
 
 /// A point with the parameters of its last effect where the ranges place the target. Directions that the ranges do
 /// not determine, such as a shift of a plane in itself, stay within `within` steps of the start. Returns the start
@@ -92,27 +89,18 @@ fn rows(problem: &Problem, space: &Space, effect: &dyn Effect, at: &DVector<f64>
         .filter_map(|(shot, seen): (&Shot, &Observation)| {
             let range_m = seen.range_m.filter(|_| problem.declared.range_sd_m > 0.0)?;
             let placed = model.placed(problem.stage, *shot)?;
-            let slopes_m =
-                (0..values.len()).map(|number| slope_m(problem, effect, &values, number, &placed));
+            let twists = effect.twists(&values, problem.stage, &placed);
+            let steps = effect.parameters().iter().map(|known| known.step);
+            let slopes_m = twists.iter().zip(steps);
+            let slopes_m = slopes_m.map(|(twist, step)| step * slope_m(problem, twist, &placed));
             Some(Row { off_m: range_m - placed.hit.range_m, slopes_m: slopes_m.collect() })
         })
         .collect()
 }
 
-/// Change of the range of a shot by one parameter, m per step: the motion of its surface point, projected on the
-/// normal and seen along the ray.
-fn slope_m(
-    problem: &Problem,
-    effect: &dyn Effect,
-    values: &[f64],
-    number: usize,
-    shot: &Shot,
-) -> f64 {
-    let mut moved = values.to_vec();
-    moved[number] += STEP * effect.parameters()[number].step;
-    let [there, here] = [moved.as_slice(), values]
-        .map(|values| effect.motion(values, problem.stage, shot).unwrap_or(Pose::NONE));
-    let motion: Pose<Global, Global> = there * here.inverse();
-    let way_m = (motion * shot.hit.point).xyz - shot.hit.point.xyz;
-    -way_m.dot(shot.normal) / (STEP * shot.hit.cos_theta.max(0.05))
+/// Change of the range of a shot by a small motion of the target, m: the way of its surface point, projected on the normal
+/// and seen along the ray.
+fn slope_m(problem: &Problem, twist: &Twist, shot: &Shot) -> f64 {
+    let way_m = way_m(twist, problem.stage.middle, shot.hit.point.xyz);
+    -way_m.dot(shot.normal) / shot.hit.cos_theta.max(0.05)
 }

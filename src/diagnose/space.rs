@@ -2,11 +2,12 @@
 //! where that is not calibrated, and after it the parameters of the effects in units of their steps.
 
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 use super::level::{MOST_OFF_DB, off_the_stored, prior};
 use super::observation::DB;
 use crate::brdf::Brdf;
-use crate::effects::{Effect, Model, Receiver, Shot, rank};
+use crate::effects::{Effect, Model, Receiver, Shot, Stage, Twist, rank};
 use crate::fit::FitError;
 use crate::fit::coordinates::{Coordinates, frequencies};
 use crate::fit::minimise::Local;
@@ -44,22 +45,6 @@ pub(super) struct Difference {
     pub ends: [DVector<f64>; 2],
     /// Difference of the unknown.
     pub width: f64,
-}
-
-/// An unknown that does nothing but shift the target along an axis.
-pub(super) struct Shift<'a> {
-    effect: &'a dyn Effect,
-    number: usize,
-    /// 0, 1 or 2 for x, y or z.
-    pub axis: usize,
-    step: f64,
-}
-
-impl Shift<'_> {
-    /// Shift of the target at a shot per unit of the unknown, m.
-    pub fn per_unit_m(&self, shot: &Shot) -> f64 {
-        self.effect.shifts(self.number, shot).map_or(0.0, |(_, per_unit)| per_unit * self.step)
-    }
 }
 
 impl<'a> Space<'a> {
@@ -142,23 +127,20 @@ impl<'a> Space<'a> {
         moving
     }
 
-    /// The effect of an unknown and the number of its parameter; none for unknowns of scattering models.
-    fn parameter(&self, index: usize) -> Option<(&'a dyn Effect, usize)> {
-        let mut number = index.checked_sub(self.base_len())?;
-        for effect in &self.effects {
-            if number < effect.parameters().len() {
-                return Some((*effect, number));
+    /// How the target moves at every shot per unit of each of the unknowns of [`Space::moving`]. Of two effects that move
+    /// the target the second is taken not to turn it.
+    pub fn twists(&self, at: &DVector<f64>, stage: &Stage, shots: &[Shot]) -> Vec<Vec<Twist>> {
+        let values = self.effect_values(at);
+        let twists_of = |shot: &Shot| {
+            let mut all = Vec::new();
+            for (effect, values) in self.effects.iter().zip(&values) {
+                let twists = effect.twists(values, stage, shot);
+                let known = effect.parameters().iter().zip(twists);
+                all.extend(known.map(|(known, twist)| twist.map(|by| by * known.step)));
             }
-            number -= effect.parameters().len();
-        }
-        None
-    }
-
-    /// An unknown as a shift of the target; `None` for an unknown that does anything else.
-    pub fn shift(&self, index: usize, shots: &[Shot]) -> Option<Shift<'a>> {
-        let (effect, number) = self.parameter(index)?;
-        let (axis, _) = effect.shifts(number, shots.first()?)?;
-        Some(Shift { effect, number, axis, step: effect.parameters()[number].step })
+            all
+        };
+        shots.par_iter().map(twists_of).collect()
     }
 
     /// Number of unknowns of the scattering models and of the level, which come first.
@@ -293,6 +275,10 @@ impl<'a> Space<'a> {
             }
         }
         let found = self.effects.iter().copied().zip(self.effect_values(at));
+        let found = found.map(|(effect, values)| match effect.whole(&values) {
+            Some((whole, all)) => (whole as &dyn Effect, all),
+            None => (effect, values),
+        });
         let mut effects: Vec<_> = self.declared.iter().cloned().chain(found).collect();
         effects.sort_by_key(|(effect, _)| rank(effect.name()));
         let level = self.level_index().map_or(1.0, |index| at[index].exp());

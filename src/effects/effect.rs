@@ -6,6 +6,7 @@ use super::echo::MeanEcho;
 use super::place::Place;
 use super::receiver::Receiver;
 use super::shot::{Shot, Stage};
+use super::twist::Twist;
 use crate::brdf::Brdf;
 use crate::frames::{Global, Pose};
 
@@ -53,6 +54,17 @@ pub trait Effect: Sync {
         &[]
     }
 
+    /// The range in which a search varies a parameter of a member, within that of the parameter.
+    fn searched(&self, parameter: usize) -> [f64; 2] {
+        let EffectParameter { min, max, .. } = self.parameters()[parameter];
+        [min, max]
+    }
+
+    /// The effect of which this is a member, with the values of all its parameters; `None` for an effect by itself.
+    fn whole(&self, _values: &[f64]) -> Option<(&'static dyn Effect, Vec<f64>)> {
+        None
+    }
+
     /// Values from which a search starts, with a weak effect. There are several if one start could miss the optimum,
     /// such as places over the target.
     fn starts(&self, stage: &Stage, shots: &[Shot]) -> Vec<Vec<f64>>;
@@ -67,10 +79,10 @@ pub trait Effect: Sync {
         false
     }
 
-    /// The global axis (0, 1 or 2) along which a parameter shifts the target at a shot, and the shift, m per unit of
-    /// the parameter, applied after the other parameters. `None` for a parameter that does anything else.
-    fn shifts(&self, _parameter: usize, _shot: &Shot) -> Option<(usize, f64)> {
-        None
+    /// The small motion of the target at a shot per unit of each parameter, from where these values place it. Empty if the
+    /// target does not move.
+    fn twists(&self, _values: &[f64], _stage: &Stage, _shot: &Shot) -> Vec<Twist> {
+        Vec::new()
     }
 
     /// Parameters, by their positions, that are the x, y and z of one vector, with the vector's name.

@@ -8,11 +8,9 @@ use super::library::library;
 use super::place::Place;
 use super::receiver::Receiver;
 use super::shot::{Shot, Stage};
+use super::twist::Twist;
 use crate::brdf::Brdf;
 use crate::frames::{Global, Pose};
-
-/// Most parameters of an effect that has members.
-const MOST: usize = 10;
 
 /// An effect with some of its parameters.
 struct Member {
@@ -28,7 +26,7 @@ static MEMBERS: LazyLock<Vec<Member>> = LazyLock::new(|| {
     for whole in library() {
         for used in whole.members() {
             let parameters: Vec<EffectParameter> =
-                used.iter().map(|&place| whole.parameters()[place]).collect();
+                used.iter().map(|&place| searched(whole, place)).collect();
             // Made once for the whole program.
             let about = About { parameters: parameters.leak(), ..*whole.about() };
             members.push(Member { whole, about, used });
@@ -44,23 +42,26 @@ pub(crate) fn family(effect: &dyn Effect) -> Vec<&dyn Effect> {
     if members.is_empty() { vec![effect] } else { members }
 }
 
+/// A parameter with the range in which a search varies it.
+fn searched(whole: &dyn Effect, place: usize) -> EffectParameter {
+    let [min, max] = whole.searched(place);
+    EffectParameter { min, max, ..whole.parameters()[place] }
+}
+
 impl Member {
     /// The values of all parameters.
-    fn whole_values(&self, values: &[f64]) -> ([f64; MOST], usize) {
-        let parameters = self.whole.parameters();
-        let mut all = [0.0; MOST];
-        all.iter_mut().zip(parameters).for_each(|(value, known)| *value = known.absent);
+    fn whole_values(&self, values: &[f64]) -> Vec<f64> {
+        let mut all: Vec<f64> = self.whole.parameters().iter().map(|known| known.absent).collect();
         self.used.iter().zip(values).for_each(|(&place, value)| all[place] = *value);
-        (all, parameters.len())
+        all
     }
 }
 
 /// Calls a method of the whole effect with all values.
 macro_rules! whole {
-    ($self:ident.$method:ident($values:ident $(, $argument:expr)*)) => {{
-        let (all, count) = $self.whole_values($values);
-        $self.whole.$method(&all[..count] $(, $argument)*)
-    }};
+    ($self:ident.$method:ident($values:ident $(, $argument:expr)*)) => {
+        $self.whole.$method(&$self.whole_values($values) $(, $argument)*)
+    };
 }
 
 impl Effect for Member {
@@ -91,8 +92,13 @@ impl Effect for Member {
         self.whole.moves()
     }
 
-    fn shifts(&self, parameter: usize, shot: &Shot) -> Option<(usize, f64)> {
-        self.whole.shifts(self.used[parameter], shot)
+    fn whole(&self, values: &[f64]) -> Option<(&'static dyn Effect, Vec<f64>)> {
+        Some((self.whole, self.whole_values(values)))
+    }
+
+    fn twists(&self, values: &[f64], stage: &Stage, shot: &Shot) -> Vec<Twist> {
+        let all = whole!(self.twists(values, stage, shot));
+        self.used.iter().filter_map(|&place| all.get(place).copied()).collect()
     }
 
     fn motion(&self, values: &[f64], stage: &Stage, shot: &Shot) -> Option<Pose<Global, Global>> {
@@ -161,14 +167,13 @@ mod tests {
         let bench = Bench::plate();
         assert!(MEMBERS.len() >= 3);
         for member in &*MEMBERS {
-            assert!(member.whole.parameters().len() <= MOST, "{}", member.name());
             let starts = member.starts(&bench.stage(), &bench.shots);
             assert!(!starts.is_empty(), "{}", member.name());
             for start in starts {
-                let (all, count) = member.whole_values(&start);
+                let all = member.whole_values(&start);
                 for shot in &bench.shots {
                     let own = member.gain(&start, &bench.stage(), shot);
-                    assert_eq!(own, member.whole.gain(&all[..count], &bench.stage(), shot));
+                    assert_eq!(own, member.whole.gain(&all, &bench.stage(), shot));
                 }
             }
         }

@@ -29,6 +29,7 @@ mod spread;
 #[cfg(test)]
 mod testing;
 mod tilt;
+mod twist;
 
 pub use ceiling::{Ceiling, Output, SaturationCurve};
 pub use declared::SceneEffects;
@@ -46,3 +47,5 @@ pub use place::Place;
 pub use receiver::Receiver;
 pub use shot::{Shot, Stage, middle};
 pub use tilt::tilted_cos_theta;
+pub use twist::Twist;
+pub(crate) use twist::way_m;

@@ -14,6 +14,7 @@ use super::library::pose::Pose as PoseEffect;
 use super::receiver::Receiver;
 use super::shot::{Shot, Stage};
 use super::tilt::{NODES, nodes, tilted_cos_theta};
+use super::twist::Twist;
 use crate::brdf::{Brdf, Retro, Scattering};
 use crate::frames::{Direction, Global, Pose, Ray, Surface};
 use crate::radar::scan::PATTERN_RANGE_M;
@@ -116,11 +117,9 @@ impl Prediction {
 }
 
 impl Model<'_> {
-    /// This model with the target shifted along an axis by `by_m`, m, after its effects have moved it.
-    pub(crate) fn shifted(mut self, axis: usize, by_m: f64) -> Self {
-        let mut pose = vec![0.0; PoseEffect.parameters().len()];
-        pose[axis] = by_m;
-        self.effects.push((&PoseEffect, pose));
+    /// This model with the target moved a little further, after its effects have moved it.
+    pub(crate) fn twisted(mut self, by: Twist) -> Self {
+        self.effects.push((&PoseEffect, by.to_vec()));
         self
     }
 

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::intersection::shot_along;
+use super::twist::way_m;
 use super::{
     Effect, EffectParameter, MeanEcho, Model, Prediction, Receiver, Shot, Stage, find, library,
     middle,
@@ -271,25 +272,30 @@ fn names_and_parameters_are_unique() {
     }
 }
 
+/// Beside them a second motion is of the square of the step.
 #[test]
-fn what_is_said_to_shift_the_target_does_nothing_else() {
+fn twists_are_the_slopes_of_the_motion() {
+    const STEP: f64 = 1e-3;
     let bench = Bench::plate();
     let (stage, shot) = (bench.stage(), Shot { progress: 0.3, ..bench.shots[7] });
-    let mut shifts = 0;
-    for effect in library() {
+    let mut moving = 0;
+    for effect in library().into_iter().filter(|effect| effect.moves()) {
         let parameters = effect.parameters();
-        let values: Vec<f64> = parameters.iter().map(|parameter| 3.0 * parameter.step).collect();
-        for (number, parameter) in parameters.iter().enumerate() {
-            let Some((axis, per_unit)) = effect.shifts(number, &shot) else { continue };
-            let mut more = values.clone();
-            more[number] += parameter.step;
-            let [before, after] = [values.clone(), more]
-                .map(|values| effect.motion(&values, &stage, &shot).unwrap() * shot.hit.point);
-            let mut way_m = after.xyz - before.xyz;
-            way_m[axis] -= per_unit * parameter.step;
-            assert!(way_m.length() < 1e-12, "{} {}: {way_m}", effect.name(), parameter.name);
-            shifts += 1;
+        let values: Vec<f64> = parameters.iter().map(|parameter| 2.0 * parameter.step).collect();
+        let here = effect.motion(&values, &stage, &shot).unwrap() * shot.hit.point;
+        let twists = effect.twists(&values, &stage, &shot);
+        assert_eq!(twists.len(), parameters.len(), "{}", effect.name());
+        for (number, (parameter, twist)) in parameters.iter().zip(&twists).enumerate() {
+            let ends = [STEP, -STEP].map(|by| {
+                let mut there = values.clone();
+                there[number] += by * parameter.step;
+                (effect.motion(&there, &stage, &shot).unwrap() * shot.hit.point).xyz
+            });
+            let slope = (ends[0] - ends[1]) / (2.0 * STEP * parameter.step);
+            let off = (slope - way_m(twist, stage.middle, here.xyz)).length();
+            assert!(off < 1e-8, "{} {}: {off}", effect.name(), parameter.name);
         }
+        moving += 1;
     }
-    assert!(shifts > 6);
+    assert_eq!(moving, 2);
 }

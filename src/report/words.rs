@@ -109,7 +109,8 @@ pub(super) fn summary(found: &FoundEffect) -> Option<String> {
     let effect = find(found.name)?;
     let mut values = Vec::new();
     for parameter in effect.parameters() {
-        values.push(found.parameters.get(parameter.name)?.value);
+        let number = found.parameters.get(parameter.name);
+        values.push(number.map_or(parameter.absent, |number| number.value));
     }
     effect.summary(&values)
 }

@@ -1,11 +1,11 @@
 //! A target that does not stand where the scene says: turned about the middle of the shots, by roll,
 //! pitch and yaw about the fixed axes x, y, z, and then shifted.
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level};
-use crate::effects::intersection::motion;
 use crate::effects::shot::{Shot, Stage};
+use crate::effects::twist::{Twist, placed, twists};
 use crate::frames::{Global, Pose as FramePose};
 
 /// From where the scene has the target to where it stands.
@@ -24,9 +24,10 @@ const PARAMETERS: [EffectParameter; 6] = [
     EffectParameter::new("rotation_z_deg", "deg", TURN_DEG, 0.0, 0.5),
 ];
 
-fn rotation(turn_deg: DVec3) -> DMat3 {
-    let turn_rad = turn_deg.map(f64::to_radians);
-    Motion::from_euler_xyz(turn_rad, DVec3::ZERO).rotation()
+/// Shift, m, and roll, pitch and yaw, deg.
+fn shift_and_turn(values: &[f64]) -> Option<[DVec3; 2]> {
+    let &[x, y, z, roll, pitch, yaw] = values else { return None };
+    Some([DVec3::new(x, y, z), DVec3::new(roll, pitch, yaw)])
 }
 
 const ABOUT: About = About {
@@ -55,8 +56,9 @@ impl Effect for Pose {
         true
     }
 
-    fn shifts(&self, parameter: usize, _: &Shot) -> Option<(usize, f64)> {
-        (parameter < 3).then_some((parameter, 1.0))
+    fn twists(&self, values: &[f64], _: &Stage, _: &Shot) -> Vec<Twist> {
+        let all = shift_and_turn(values).map(|[shift_m, turn_deg]| twists(shift_m, turn_deg));
+        all.map_or(Vec::new(), Vec::from)
     }
 
     fn vectors(&self) -> &'static [(&'static str, [usize; 3])] {
@@ -64,10 +66,9 @@ impl Effect for Pose {
     }
 
     fn motion(&self, values: &[f64], stage: &Stage, _: &Shot) -> Option<Motion> {
-        let &[x, y, z, roll, pitch, yaw] = values else { return None };
-        let (shift_m, turn_deg) = (DVec3::new(x, y, z), DVec3::new(roll, pitch, yaw));
+        let [shift_m, turn_deg] = shift_and_turn(values)?;
         let rests = shift_m == DVec3::ZERO && turn_deg == DVec3::ZERO;
-        (!rests).then(|| motion(rotation(turn_deg), stage.middle, shift_m))
+        (!rests).then(|| placed(stage.middle, shift_m, turn_deg))
     }
 }
 
