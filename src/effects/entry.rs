@@ -88,7 +88,7 @@ impl Level {
 /// let parameters = [("slope_db".to_owned(), 2.0)].into();
 /// let drift = EffectEntry { name: "drift".to_owned(), source: None, parameters };
 /// let found = resolve(&[drift.clone()], Level::Instrument).unwrap();
-/// assert_eq!(found[0].1, [2.0, 0.0, 0.0, 1.0]);
+/// assert_eq!(found[0].1[..4], [2.0, 0.0, 0.0, 1.0]);
 /// assert!(resolve(&[drift], Level::Scene).is_err());
 /// ```
 pub fn resolve(entries: &[EffectEntry], level: Level) -> Result<EffectList, EffectError> {
@@ -112,9 +112,9 @@ pub fn resolve(entries: &[EffectEntry], level: Level) -> Result<EffectList, Effe
 ///
 /// ```
 /// use matdb::effects::{Level, entry, find, resolve};
-/// let drift = find("drift").unwrap();
-/// let written = entry(drift, &[2.0, 0.0, 0.0, 1.0]);
-/// assert_eq!(resolve(&[written], Level::Instrument).unwrap()[0].1, [2.0, 0.0, 0.0, 1.0]);
+/// let gain = find("fov-gain").unwrap();
+/// let written = entry(gain, &[2.0, 0.0, 0.5, 0.0, 0.0, 0.0]);
+/// assert_eq!(resolve(&[written], Level::Instrument).unwrap()[0].1[..3], [2.0, 0.0, 0.5]);
 /// ```
 pub fn entry(effect: &dyn Effect, values: &[f64]) -> EffectEntry {
     let values = std::iter::zip(effect.parameters(), values);
