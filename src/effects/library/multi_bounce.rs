@@ -4,9 +4,10 @@
 //! unless something hides it: P₂ = coupling·∫ Φ·f₁(i, ω)·cos θ_ω · f₂·cos θ_o·Ω·A dω, over fixed
 //! directions, spread by the cosine and by a wide and a narrow lobe, each weighed by their joint density (the
 //! balance heuristic: Veach & Guibas, SIGGRAPH 1995), and exactly in the direction of the mirror where f₁ has a lobe
-//! too narrow for them. A is how well the antenna sees the second hit beside the first, as with `[bounce]`: the
-//! beam's own pattern, and side lobes below it. The range is half the whole way, and what is reported is the mean
-//! by power.
+//! too narrow for them. A is how well the antenna sees the second hit at a distance d from the axis of its beam: the
+//! most of the beam's own pattern, of exp(−d/reach) and of side lobes. Without a reach it is that of `[bounce]`. The
+//! range is half the whole way, and what is reported is the mean by power. Paths are traced once, and shaded once for
+//! all values of coupling and reach.
 
 use std::f64::consts::PI;
 
@@ -75,9 +76,13 @@ struct Detour {
     second: [Direction<Surface>; 2],
     /// Whether it leaves the first surface exactly as from a mirror.
     is_mirrored: bool,
-    /// Power received, W, where the second f is 1/sr and the first one, too; of a mirrored path where the first surface
-    /// sends on all that it receives.
+    /// Power received, W, where the second f is 1/sr and the first one, too, and the antenna sees the second surface as
+    /// well as the first; of a mirrored path where the first surface sends on all that it receives.
     watts: f64,
+    /// How well the beam sees the second surface, as a share of the power on its axis.
+    pattern: f64,
+    /// Distance of the second surface from the axis of the beam, m.
+    beside_m: f64,
     /// Divergence of the beam at the second surface, rad.
     beam_rad: f64,
     /// Half the whole way, m.
@@ -145,13 +150,14 @@ fn detour(
     let sent_w = stage.link.flux_w(shot.hit.cos_theta) * sent_sr;
     let along_beam_m = (second.hit.point.xyz - radar.xyz).dot(shot.ray.direction.xyz());
     let solid_angle_sr = stage.link.solid_angle_sr(&beam, along_beam_m);
-    let share = cos_exit * solid_angle_sr * pattern.max(OUTSIDE_SPOT);
     Some(Detour {
         regions: [shot.region, second.region],
         first: [frame.local(-shot.ray.direction.xyz()), o],
         second: [there.local(-onward), there.local(back.xyz())],
         is_mirrored: density_per_sr.is_none(),
-        watts: sent_w * share,
+        watts: sent_w * cos_exit * solid_angle_sr,
+        pattern,
+        beside_m: (second.hit.point.xyz - radar.xyz).reject_from(shot.ray.direction.xyz()).length(),
         beam_rad: beam.divergence_rad(),
         range_m: (shot.hit.range_m + way_m) / 2.0,
     })
@@ -167,10 +173,28 @@ fn detours(stage: &Stage, shot: &Shot) -> Vec<Detour> {
     all.filter_map(|(o, density_per_sr)| detour(stage, shot, &frame, o, density_per_sr)).collect()
 }
 
-/// Power, W, and range, m, of all that a chirp returns by way of a second surface.
-fn returned(laws: &[Brdf], detours: &[Detour]) -> Option<MeanEcho> {
-    let detours = detours.iter();
-    detours.map(|one| MeanEcho::at_once(one.power_w(laws), one.range_m)).reduce(MeanEcho::with)
+/// What a path by way of a second surface returns by the laws of the two.
+struct Bounce {
+    /// Power, W, where the antenna sees the second surface as well as the first, and half the whole way, m.
+    echo: MeanEcho,
+    pattern: f64,
+    beside_m: f64,
+}
+
+impl Bounce {
+    fn new(laws: &[Brdf], detour: &Detour) -> Bounce {
+        let Detour { pattern, beside_m, range_m, .. } = *detour;
+        Bounce { echo: MeanEcho::at_once(detour.power_w(laws), range_m), pattern, beside_m }
+    }
+
+    /// The echo through an antenna of this reach, m.
+    fn seen(&self, reach_m: f64) -> MeanEcho {
+        let mut seen = self.pattern.max(OUTSIDE_SPOT);
+        if reach_m > 0.0 {
+            seen = seen.max((-self.beside_m / reach_m).exp());
+        }
+        MeanEcho { power_w: seen * self.echo.power_w, ..self.echo }
+    }
 }
 
 const ABOUT: About = About {
@@ -178,11 +202,15 @@ const ABOUT: About = About {
     level: Level::Scene,
     description: "Part of the wave goes on from the first surface to a second one and returns from there. At \
          0 dB its power is what the two scattering models and the antenna's pattern give: its beam, and side lobes \
-         of -20 dB; coupling_db is added to it.",
+         of -20 dB; coupling_db is added to it. An antenna that sees farther beside its beam has the pattern exp(−d/reach_m) at the \
+         distance d from its axis, where that is more.",
     signature: "Places that face another surface, as in corners and under arms, are too bright and too far \
          away. A foreign patch is bright without a longer range, and a wrong pose is off in range \
          without being bright; convex targets never show this.",
-    parameters: &[EffectParameter::new("coupling_db", "dB", [NONE_DB, 30.0], NONE_DB, 1.0)],
+    parameters: &[
+        EffectParameter::new("coupling_db", "dB", [NONE_DB, 30.0], NONE_DB, 1.0),
+        EffectParameter::new("reach_m", "m", [0.0, 0.5], 0.0, 0.01),
+    ],
     conflicts: &[Conflict {
         with: Setting::Bounce,
         problem: "brings echoes by way of a second surface, and so does [bounce]",
@@ -196,7 +224,16 @@ impl Effect for MultiBounce {
     }
 
     fn starts(&self, _stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
-        vec![vec![-10.0], vec![0.0], vec![10.0]]
+        let mut starts = Vec::new();
+        for reach_m in [0.0, 0.02, 0.06, 0.2] {
+            starts.extend([-10.0, 0.0, 10.0].map(|coupling_db| vec![coupling_db, reach_m]));
+        }
+        starts
+    }
+
+    /// Side lobes of one level; and an antenna that sees less the farther from its axis.
+    fn members(&self) -> &'static [&'static [usize]] {
+        &[&[0], &[0, 1]]
     }
 
     fn survey_key(&self, values: &[f64]) -> Option<Vec<f64>> {
@@ -210,18 +247,21 @@ impl Effect for MultiBounce {
 
     fn shade(&self, survey: &Survey, laws: &[Brdf]) -> Survey {
         let all = survey.downcast_ref::<Vec<Vec<Detour>>>().map_or(&[][..], Vec::as_slice);
-        let returned = all.par_iter().map(|detours| returned(laws, detours));
-        Box::new(returned.collect::<Vec<Option<MeanEcho>>>())
+        let of_shot =
+            |detours: &Vec<Detour>| detours.iter().map(|one| Bounce::new(laws, one)).collect();
+        Box::new(all.par_iter().map(of_shot).collect::<Vec<Vec<Bounce>>>())
     }
 
     fn arrive(&self, values: &[f64], shaded: &Survey, arrived: &mut [Option<MeanEcho>]) {
-        let coupling = ratio_from_db(values.first().copied().unwrap_or(NONE_DB));
-        let returned = shaded.downcast_ref::<Vec<Option<MeanEcho>>>().into_iter().flatten();
-        for (detour, one) in returned.zip(arrived) {
-            if let (Some(one), Some(detour)) = (one, detour) {
-                *one = one.with(MeanEcho { power_w: coupling * detour.power_w, ..*detour });
+        let &[coupling_db, reach_m] = values else { return };
+        let coupling = ratio_from_db(coupling_db);
+        let all = shaded.downcast_ref::<Vec<Vec<Bounce>>>().map_or(&[][..], Vec::as_slice);
+        all.par_iter().zip(arrived).for_each(|(bounces, one)| {
+            let seen = bounces.iter().map(|bounce| bounce.seen(reach_m)).reduce(MeanEcho::with);
+            if let (Some(one), Some(seen)) = (one, seen) {
+                *one = one.with(MeanEcho { power_w: coupling * seen.power_w, ..seen });
             }
-        }
+        });
     }
 }
 
@@ -235,7 +275,7 @@ mod tests {
     #[test]
     fn it_adds_power_and_way_in_a_corner_and_nothing_on_a_ball() {
         let corner = Bench::of(dihedral());
-        let (bare, with) = (corner.bare(), corner.with(&MultiBounce, &[0.0]));
+        let (bare, with) = (corner.bare(), corner.with(&MultiBounce, &[0.0, 0.0]));
         let mut raised = 0;
         for (bare, with) in bare.iter().zip(&with) {
             assert!(with.power_w >= bare.power_w && with.range_m >= bare.range_m - 1e-9);
@@ -243,7 +283,40 @@ mod tests {
         }
         assert!(raised > bare.len() / 2, "{raised} of {}", bare.len());
         let ball = Bench::sphere();
-        assert_eq!(ball.with(&MultiBounce, &[0.0]), ball.bare());
+        assert_eq!(ball.with(&MultiBounce, &[0.0, 0.0]), ball.bare());
+        assert_eq!(corner.with(&MultiBounce, &[NONE_DB, 0.3]), bare);
+    }
+
+    /// Power by way of a second surface, W.
+    fn bounced_w(corner: &Bench, values: &[f64]) -> Vec<f64> {
+        let pairs = corner.with(&MultiBounce, values).into_iter().zip(corner.bare());
+        pairs.map(|(with, bare)| with.power_w - bare.power_w).collect()
+    }
+
+    /// Between them are the beam with its side lobes, and an antenna that sees everything as well as its axis.
+    #[test]
+    fn an_antenna_of_more_reach_sees_more() {
+        let corner = Bench::of(dihedral());
+        let reaches_m = [0.0, 1e-6, 0.05, 0.1, 0.5];
+        let [none, least, ..] = reaches_m.map(|reach_m| bounced_w(&corner, &[0.0, reach_m]));
+        assert_eq!(none, least);
+        for pair in reaches_m.windows(2) {
+            let [nearer, farther] = [0, 1].map(|k| bounced_w(&corner, &[0.0, pair[k]]));
+            for ((nearer_w, farther_w), side_w) in nearer.iter().zip(&farther).zip(&none) {
+                assert!(farther_w >= nearer_w, "{pair:?}");
+                assert!(*farther_w <= 1.0001 * side_w / OUTSIDE_SPOT, "{pair:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_pattern_falls_by_a_factor_of_e_over_the_reach() {
+        let echo = MeanEcho::at_once(2.0, 8.0);
+        let bounce = Bounce { echo, pattern: 1e-4, beside_m: 0.12 };
+        assert!((bounce.seen(0.06).power_w - 2.0 * (-2.0f64).exp()).abs() < 1e-12);
+        assert_eq!(bounce.seen(0.02).power_w, 2.0 * OUTSIDE_SPOT);
+        let inside = Bounce { pattern: 0.5, ..bounce };
+        assert_eq!(inside.seen(0.06).power_w, 1.0);
     }
 
     /// ∫ cos θ dω over the hemisphere is π.
@@ -271,7 +344,7 @@ mod tests {
                 let found = model.predict(&corner.stage(), &corner.shots);
                 found.arrived.iter().flatten().map(|one| one.power_w).sum()
             };
-            total(vec![(&MultiBounce as &dyn Effect, vec![0.0])]) / total(Vec::new()) - 1.0
+            total(vec![(&MultiBounce as &dyn Effect, vec![0.0, 0.0])]) / total(Vec::new()) - 1.0
         };
         assert!((share(0.8) / share(0.4) - 2.0).abs() < 1e-9);
         assert!(share(0.8) > 0.02 && share(0.8) < 0.4, "{}", share(0.8));
