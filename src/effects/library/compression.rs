@@ -1,6 +1,9 @@
 //! A receiver that saturates: P becomes P/(1 + (P/P_sat)^p)^(1/p), with the knee p (Rapp, Proc. 2nd
 //! Eur. Conf. Satell. Commun. (1991) 179, for powers).
 //!
+//! The knee is a family by itself: 1 is the softest ceiling, 4 nearly a clip, and 1.3 within 0.2 dB of an amplitude that
+//! saturates as a hyperbolic tangent does.
+//!
 //! A receiver that saturates at once also compresses the speckle, each look by itself or the mean of all; a
 //! gain control slower than a chirp passes all of it.
 
@@ -73,6 +76,18 @@ mod tests {
         assert!((after_db(1e-7) + 40.0 + db(2.0)).abs() < 1e-9);
         assert!((after_db(1.0) + 40.0).abs() < 1e-3);
         assert!((after_db(1e-12) + 90.0).abs() < 1e-3);
+    }
+
+    /// √P becomes √P_sat·tanh √(P/P_sat), another form of saturation.
+    #[test]
+    fn a_hyperbolic_tangent_is_one_of_the_knees() {
+        let rapp = Ceiling { saturation_w: 1.0, knee: 1.306, at_once: 1.0, averaged: 1.0 };
+        let curve = rapp.over(f64::INFINITY);
+        for step in -300..=200 {
+            let power = 10f64.powf(f64::from(step) / 100.0);
+            let off_db = db(curve.of(power.ln()).ln_mean.exp() / power.sqrt().tanh().powi(2));
+            assert!(off_db.abs() < 0.2, "{power}: {off_db} dB");
+        }
     }
 
     #[test]
