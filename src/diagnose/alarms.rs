@@ -1,13 +1,23 @@
 //! Chirps that see no target: their silence, and what noise alone made them report.
 //!
-//! A receiver reports the strongest of the n cells of its gate, if that reaches the threshold T. Of noise N with L looks it
-//! is below y with the probability G(y)ⁿ, where G is that of one cell. A false alarm y then has the density n·g(y)·G(y)ⁿ⁻¹ in
-//! ln y, and silence has G(T)ⁿ. Where no gate is declared, n is the most likely one, so that only the powers of false alarms
+//! Noise N with L looks is below y in one cell of the gate with the probability G(y), of density g(y) in ln y. In all n cells it
+//! is below the threshold T with G(T)ⁿ, the probability of silence. What else is reported has these densities:
+//!
+//! | `returns` | density of a false alarm y |
+//! |---|---|
+//! | `strongest` | n·g(y)·G(y)ⁿ⁻¹ |
+//! | `first` | (1 − G(T)ⁿ)·g(y)/(1 − G(T)): every cell above T is as likely to be the first |
+//! | `all` | n·g(y)/G(T), beside G(T)ⁿ of every chirp: the cells above T are independent |
+//!
+//! Where no gate is declared, n is the most likely one, so that only the powers of false alarms
 //! tell N: a cloud without any may have been cleaned, and its silence is no evidence.
+
+use serde::Serialize;
 
 use super::observation::{DB, ReceiverLimits};
 use crate::effects::Receiver;
 use crate::fit::gamma_law::GammaLaw;
+use crate::radar::Returns;
 
 /// Power over the threshold above which a detection is no false alarm: it would be far beyond the tail of any noise
 /// that is mostly below.
@@ -36,8 +46,13 @@ pub struct Alarms {
     pub powers_w: Vec<f64>,
     /// How many others lie near the target by chance, and are among the strays.
     pub near_target: f64,
-    /// Number of chirps that stay silent.
+    /// Number of false alarms of chirps that meet the target, where only the first detection is reported: an echo ends
+    /// the search, so that they do not tell the noise.
+    pub of_target: usize,
+    /// Number of chirps that stay silent; of all chirps where all detections are reported.
     pub silent: usize,
+    /// Which detections of a chirp are reported.
+    pub returns: Returns,
     /// Looks of the noise.
     pub looks: f64,
     /// Range cells of the gate; none where it is not declared.
@@ -46,11 +61,23 @@ pub struct Alarms {
     pub weight: f64,
 }
 
+/// Detections that count as false alarms, of chirps without an echo.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct FalseAlarms {
+    /// How many there are. Where a chirp reports its first detection, those of chirps that meet the target are not among
+    /// them.
+    pub counted: usize,
+    /// How many the declared noise makes on average; none without a declared gate.
+    pub expected: Option<f64>,
+}
+
 /// No chirps.
 pub(super) static NONE: Alarms = Alarms {
     powers_w: Vec::new(),
     near_target: 0.0,
+    of_target: 0,
     silent: 0,
+    returns: Returns::Strongest,
     looks: 1.0,
     cells: None,
     weight: 1.0,
@@ -72,13 +99,36 @@ impl Alarms {
         if cells <= 0.0 {
             return 0.0;
         }
-        let mut sum = cells * self.silent as f64 * cell.ln_below(limits.threshold_w);
+        let ln_silent = cell.ln_below(limits.threshold_w);
+        let mut sum = cells * self.silent as f64 * ln_silent;
         for power_w in &self.powers_w {
-            let density = cell.ln_density(*power_w) + cells.ln();
-            let p = (density + (cells - 1.0) * cell.ln_below(*power_w)).exp();
+            let beside_density = match self.returns {
+                Returns::Strongest => cells.ln() + (cells - 1.0) * cell.ln_below(*power_w),
+                Returns::First => ln_complement(cells * ln_silent) - ln_complement(ln_silent),
+                Returns::All => cells.ln() - ln_silent,
+            };
+            let p = (cell.ln_density(*power_w) + beside_density).exp();
             sum += ((1.0 - OUTLIERS) * p + OUTLIERS * OUTLIER_DENSITY).ln();
         }
         self.weight * sum
+    }
+
+    /// How many there are, and how many noise of a receiver makes in the declared gate.
+    pub(super) fn counted(&self, receiver: &Receiver, limits: ReceiverLimits) -> FalseAlarms {
+        let counted = self.powers_w.len();
+        let cell = self.cell(receiver, limits);
+        let ln_silent = cell.ln_below(limits.threshold_w);
+        let cells = self.cells(&cell, limits.threshold_w);
+        let expected = match self.returns {
+            Returns::All => -cells * self.silent as f64 * ln_silent.exp_m1(),
+            _ => -((self.silent + counted) as f64) * (cells * ln_silent).exp_m1(),
+        };
+        FalseAlarms { counted, expected: self.cells.map(|_| expected.max(0.0)) }
+    }
+
+    /// Number of false alarms, also of those that tell no noise.
+    pub(super) fn count(&self) -> usize {
+        self.powers_w.len() + self.of_target
     }
 
     /// How many of some detections near the target are more than chance has.
@@ -112,9 +162,17 @@ impl Alarms {
         if let Some(cells) = self.cells {
             return if count > 0.0 { cells * count / (count + self.near_target) } else { cells };
         }
-        let ln_silent = self.silent as f64 * cell.ln_below(threshold_w);
-        let ln_all: f64 = ln_silent + self.powers_w.iter().map(|y| cell.ln_below(*y)).sum::<f64>();
-        (count / -ln_all.min(-f64::MIN_POSITIVE)).min(MOST_CELLS)
+        let ln_below = cell.ln_below(threshold_w).min(-f64::MIN_POSITIVE);
+        let silent = self.silent as f64;
+        let cells = match self.returns {
+            Returns::Strongest => {
+                let ln_alarms: f64 = self.powers_w.iter().map(|y| cell.ln_below(*y)).sum();
+                -count / (silent * ln_below + ln_alarms).min(-f64::MIN_POSITIVE)
+            }
+            Returns::First => -(count / silent.max(f64::MIN_POSITIVE)).ln_1p() / ln_below,
+            Returns::All => -count / (silent * ln_below).min(-f64::MIN_POSITIVE),
+        };
+        cells.min(MOST_CELLS)
     }
 
     /// √n times the largest difference between the distribution of the powers and that of false alarms of a
@@ -129,6 +187,8 @@ impl Alarms {
         let cells = self.cells(&cell, threshold_w);
         let mut sorted = self.powers_w.clone();
         sorted.sort_by(f64::total_cmp);
+        // Of the strongest of all cells, or of one of them.
+        let cells = if self.returns == Returns::Strongest { cells } else { 1.0 };
         // Probabilities of a higher power, which keep their digits in the tail.
         let above = |power_w: f64| -(cells * cell.ln_below(power_w)).exp_m1();
         let [all, beyond] = [threshold_w, MOST_OVER_THRESHOLD * threshold_w].map(above);
@@ -164,6 +224,11 @@ impl Alarms {
     }
 }
 
+/// ln(1 − eˣ), x < 0.
+fn ln_complement(x: f64) -> f64 {
+    (-x.exp_m1()).max(f64::MIN_POSITIVE).ln()
+}
+
 /// The noise in one range cell.
 struct Cell {
     law: GammaLaw,
@@ -193,26 +258,32 @@ mod tests {
         Receiver { looks: 4.0, noise_w, ..Receiver::LINEAR }
     }
 
-    /// Chirps that report the strongest of 40 cells.
-    fn drawn(noise_w: f64, seed: u64) -> Alarms {
-        let mut alarms = Alarms { weight: 1.0, looks: 4.0, ..Alarms::default() };
+    const RETURNS: [Returns; 3] = [Returns::Strongest, Returns::First, Returns::All];
+
+    /// Chirps that report some of 40 cells.
+    fn drawn(noise_w: f64, seed: u64, returns: Returns) -> Alarms {
+        let mut alarms = Alarms { weight: 1.0, looks: 4.0, returns, ..Alarms::default() };
         for chirp in 0..4000 {
             let mut draws = Key { seed, chirp, sub_ray: 0, purpose: Purpose::Fit }.draws();
             let cells = (0..40).map(|_| noise_w * draws.gamma(4.0));
-            let strongest_w = cells.fold(0.0, f64::max);
-            if strongest_w >= LIMITS.threshold_w {
-                alarms.powers_w.push(strongest_w);
-            } else {
-                alarms.silent += 1;
+            let mut above: Vec<f64> = cells.filter(|y| *y >= LIMITS.threshold_w).collect();
+            alarms.silent += usize::from(above.is_empty() || returns == Returns::All);
+            if returns == Returns::Strongest {
+                above.sort_by(|a, b| b.total_cmp(a));
             }
+            above.truncate(if returns == Returns::All { 40 } else { 1 });
+            alarms.powers_w.extend(above);
         }
         alarms
     }
 
     #[test]
     fn false_alarms_tell_the_noise() {
-        for (noise_w, seed) in [(3.2e-10, 1), (3.6e-10, 2), (4e-10, 3)] {
-            let alarms = drawn(noise_w, seed);
+        let levels = [(3.2e-10, 1), (3.6e-10, 2), (4e-10, 3)];
+        for (returns, (noise_w, seed)) in
+            RETURNS.iter().flat_map(|returns| levels.map(|level| (*returns, level)))
+        {
+            let alarms = drawn(noise_w, seed, returns);
             assert!(alarms.powers_w.len() > 100, "{}", alarms.powers_w.len());
             let ln_p = |db: i32| {
                 let noise_w = noise_w * 10f64.powf(f64::from(db) / 20.0);
@@ -223,7 +294,45 @@ mod tests {
             assert_eq!(alarms.unlike(&receiver(noise_w), LIMITS), None);
             let [off_db, _] = alarms.unlike(&receiver(0.5 * noise_w), LIMITS).unwrap();
             assert!((2.0..=4.0).contains(&off_db), "{off_db}");
+            // A declared gate predicts their number, to within four standard deviations.
+            let gate = Alarms { cells: Some(40.0), ..alarms.clone() };
+            let FalseAlarms { counted, expected } = gate.counted(&receiver(noise_w), LIMITS);
+            let expected = expected.unwrap();
+            let off = (counted as f64 - expected) / expected.sqrt();
+            assert!(off.abs() < 4.0, "{returns:?}: {counted} {expected}");
+            assert_eq!(alarms.counted(&receiver(noise_w), LIMITS).expected, None);
         }
+    }
+
+    /// What a gate reports is less likely under the law of another kind of return.
+    #[test]
+    fn each_kind_of_return_has_its_own_law() {
+        let noise_w = 4e-10;
+        for (seed, returns) in (4..).zip(RETURNS) {
+            let alarms = Alarms { cells: Some(40.0), ..drawn(noise_w, seed, returns) };
+            let own = alarms.ln_p(&receiver(noise_w), LIMITS);
+            for other in [Returns::Strongest, Returns::First].into_iter().filter(|o| *o != returns)
+            {
+                let as_other = Alarms { returns: other, ..alarms.clone() };
+                let other_ln_p = as_other.ln_p(&receiver(noise_w), LIMITS);
+                assert!(own > other_ln_p + 1.0, "{returns:?} {other:?}: {own} {other_ln_p}");
+            }
+        }
+    }
+
+    #[test]
+    fn false_alarms_change_the_data_by_a_level_that_they_tell() {
+        let noise_w = 4e-10;
+        let alarms = drawn(noise_w, 7, Returns::Strongest);
+        let size_db =
+            |from_w: f64, to_w: f64| alarms.size_db([&receiver(from_w), &receiver(to_w)], LIMITS);
+        assert!((size_db(0.5 * noise_w, noise_w) - 2f64.log10() * 10.0).abs() < 1e-9);
+        // From the true level to another one, from none, and where nothing is reported, they tell none.
+        assert_eq!(size_db(noise_w, 0.5 * noise_w), 0.0);
+        assert_eq!(size_db(0.0, noise_w), 0.0);
+        let silent = Alarms { powers_w: Vec::new(), ..alarms.clone() };
+        let both = [0.5 * noise_w, noise_w].map(receiver);
+        assert_eq!(silent.size_db([&both[0], &both[1]], LIMITS), 0.0);
     }
 
     /// Echoes of something of any strength, as of clutter that the scene does not have.

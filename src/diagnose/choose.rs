@@ -16,15 +16,12 @@ use super::exchange::{EVEN, SAME, exchange};
 use super::explanation::{Addition, Explanation};
 use super::field::Structure;
 use super::refit::{Fit, SCOUT};
-use super::residual::{self, ResidualStructure};
 use super::scorer::{HeldOut, State};
 use super::space::Space;
 use super::support::Judge;
 use super::trial::{Search, Trial};
 use crate::effects::Effect;
 
-/// How often the search begins. If the base is then at a better place again that could change the answer, it has failed.
-const MOST_STARTS: usize = 4;
 /// Effects of the last round that are tested for being real beside the strongest.
 const MOST_HIDDEN: usize = 2;
 /// Effects of one round of which pairs are tried.
@@ -44,7 +41,7 @@ pub(super) struct Choice<'a> {
     /// The structure that a field finds beside the model.
     pub structure: Structure,
     /// Effects that are supported but for their size beside the strongest.
-    pub hidden: Vec<ResidualStructure>,
+    pub hidden: Vec<Candidate>,
 }
 
 /// Adds effects until none is supported, and removes those that others made superfluous or that are
@@ -85,7 +82,7 @@ pub(super) fn choose_effects<'a>(
             break;
         }
         if let Some(better) = scorer.better_base(&base, &model.state) {
-            if starts == MOST_STARTS {
+            if starts >= scorer.settings.most_starts {
                 let gain = better.fit.ln_likelihood - base.fit.ln_likelihood;
                 if gain > scorer.settings.least_gain {
                     return Err(DiagnoseError::SearchFailed { gain });
@@ -115,8 +112,7 @@ pub(super) fn choose_effects<'a>(
     model.added.iter_mut().for_each(|one| one.class.retain(|name| !space.has(name)));
     ranking.iter_mut().for_each(|one| one.accepted &= space.has(one.name));
     // Without an effect nothing is hidden, and what was exchanged for another is not.
-    hidden.retain(|(name, _)| !space.effects.is_empty() && !space.has(name));
-    let hidden = hidden.into_iter().map(|(_, structure)| structure).collect();
+    hidden.retain(|one| !space.effects.is_empty() && !space.has(one.name));
     Ok(Choice { base, model, ranking, structure, hidden })
 }
 
@@ -125,8 +121,8 @@ fn hidden_by_the_strongest<'a>(
     search: &Search,
     model: &Explanation<'a>,
     trials: &mut [Trial<'a>],
-) -> Vec<(&'static str, ResidualStructure)> {
-    let (scorer, mut found): (_, Vec<(&str, _)>) = (&search.scorer, Vec::new());
+) -> Vec<Candidate> {
+    let (scorer, mut found) = (&search.scorer, Vec::<Candidate>::new());
     if model.added.is_empty() {
         return found;
     }
@@ -140,11 +136,9 @@ fn hidden_by_the_strongest<'a>(
         if judge.support(trial).is_some()
             && trial.candidate.size_db >= scorer.settings.least_structure_db
             && judge.beats_placebos(trial)
-            && let Some([gain, se]) = trial.candidate.held_out
-            && found.iter().all(|(name, _)| *name != trial.candidate.name)
+            && found.iter().all(|one| one.name != trial.candidate.name)
         {
-            let Candidate { name, size_db, .. } = trial.candidate;
-            found.push((name, residual::may_be(name, size_db, gain / se)));
+            found.push(trial.candidate.clone());
         }
     }
     found

@@ -123,7 +123,8 @@ pub enum DiagnoseError {
         /// Chirps that meet the target.
         shots: usize,
     },
-    /// Searches of the scattering models find ever better fits.
+    /// The base was found at a better place after each of [`most_starts`](super::Diagnosis::most_starts) starts, the last
+    /// time by more than [`least_gain`](super::Diagnosis::least_gain): what an effect gains over it is not known.
     #[error(
         "the search failed: from each new start the scattering models fit better, the last time by \
          {gain:.1} in ln p; give the materials laws nearer to the data, such as one fitted to a curve of this cloud \

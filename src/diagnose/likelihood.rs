@@ -1,8 +1,8 @@
 //! The likelihood of the observations under a prediction.
 //!
 //! A detected power y has the density of Gamma(L, (μ + N)/L) in ln y. A chirp without a detection has the
-//! probability of staying below the threshold T. Both apply before a receiver that saturates. Where
-//! tilts vary at random the likelihood is averaged over them. Ranges are normal about the predicted
+//! probability of staying below the threshold T, or below the false alarm that was reported instead. Both apply before
+//! a receiver that saturates. Where tilts vary at random the likelihood is averaged over them. Ranges are normal about the predicted
 //! ones. One in ten thousand chirps is an outlier of any power, so that a silhouette that the mesh misses
 //! costs a bounded amount.
 
@@ -98,8 +98,7 @@ impl<'a> Likelihood<'a> {
     /// instructions.
     pub fn terms_of(&self, seen: &[(usize, Observation)]) -> Vec<Term> {
         let Likelihood { prediction, declared, .. } = *self;
-        let mut ln_seen: Vec<f64> =
-            seen.iter().map(|(_, seen)| seen.power_w.unwrap_or(declared.threshold_w)).collect();
+        let mut ln_seen: Vec<f64> = seen.iter().map(|(_, seen)| seen.level_w(declared)).collect();
         ln_all(&mut ln_seen);
         // The law of every power for every tilt.
         let floor_w = NOTHING * declared.threshold_w;

@@ -7,13 +7,13 @@ use rayon::prelude::*;
 
 use super::alarms::{Alarms, MOST_OVER_THRESHOLD};
 use super::error::DiagnoseError;
-use super::observation::Observation;
-use crate::effects::{Model, Shot, Stage};
+use super::observation::{NO_LIMIT_W, Observation};
+use crate::effects::{BeamSpot, Model, Shot, Stage};
 use crate::frames::{Global, Point, Ray};
 use crate::measure::cloud::{Cloud, CloudPoint};
 use crate::measure::median_point;
 use crate::measure::nearest::Nearest;
-use crate::radar::Chirps;
+use crate::radar::{Chirps, Returns};
 
 /// Share of a cloud off the target from which it is a cloud of another target.
 pub(super) const MOST_STRAYS: f64 = 0.25;
@@ -32,6 +32,15 @@ pub struct Stray {
 }
 
 impl Stray {
+    /// Whether the detection lies beside an edge of the target where the effects of a model place it, within the reach of the
+    /// radar's own beam.
+    pub(super) fn is_beside_edge(&self, model: &Model, stage: &Stage) -> bool {
+        let beam = BeamSpot { diameter_m: stage.geometry.radar.spot_fwhm_m() };
+        let mut model = model.clone();
+        model.effects.push((&beam, Vec::new()));
+        self.shot.is_some_and(|shot| shot.misses()) && self.is_on_target(&model, stage)
+    }
+
     /// Whether the detection lies on the target where the effects of a model place it.
     pub(super) fn is_on_target(&self, model: &Model, stage: &Stage) -> bool {
         let ranges_m = self.shot.map_or(Vec::new(), |shot| model.ranges_m(stage, &shot));
@@ -50,9 +59,11 @@ pub struct CloudMatch {
     pub alarms: Alarms,
 }
 
-/// Assigns the points of a cloud to the shots of its scan, by chirp numbers or, without them, by directions. A detection
-/// farther than 0.1 m from where its chirp meets the target is a stray, and its chirp then counts as
-/// silent.
+/// Assigns the points of a cloud to the shots of its scan, by chirp numbers or, without them, by directions. Of several
+/// detections of a chirp that reports all, the one nearest to the target is its echo. A detection
+/// farther than 0.1 m from where its chirp meets the target is a stray or, up to 6 dB above the threshold, a false alarm. Its
+/// chirp then counts as silent: an echo is weaker than the false alarm that was reported as the strongest, and unknown
+/// behind the one that was reported as the first.
 ///
 /// # Errors
 /// When points have no chirp number and no direction from a common origin, when they lie on the rays of
@@ -63,8 +74,9 @@ pub fn match_cloud(
     chirps: &Chirps,
     shots: &[Shot],
     threshold_w: f64,
+    returns: Returns,
 ) -> Result<CloudMatch, DiagnoseError> {
-    let scan = Scan { threshold_w, ..Scan::new(chirps) };
+    let scan = Scan { threshold_w, returns, ..Scan::new(chirps) };
     let is_numbered = cloud.points().iter().all(|point| point.chirp.is_some());
     if !is_numbered && scan.directions.is_none() {
         return Err(DiagnoseError::Unnumbered);
@@ -104,7 +116,7 @@ impl Assignment {
     /// Whether most of the cloud is of the target. False alarms are nobody's, as long as they are not the most.
     fn is_of_target(&self, cloud: &Cloud) -> bool {
         let points = cloud.points().len();
-        let alarms = self.cloud_match.alarms.powers_w.len();
+        let alarms = self.cloud_match.alarms.count();
         let others = points - self.on_target;
         (others - alarms.min(others)) as f64 <= MOST_STRAYS * (points - alarms) as f64
             && alarms <= points / 2
@@ -117,6 +129,8 @@ struct Scan<'a> {
     index_of_chirp: HashMap<u32, usize>,
     /// Up to so many times this power a detection without a target may be a false alarm, W.
     threshold_w: f64,
+    /// Which detections of a chirp are reported.
+    returns: Returns,
     /// `None` unless all rays start from one point.
     directions: Option<Directions>,
 }
@@ -125,7 +139,7 @@ impl Scan<'_> {
     fn new(chirps: &Chirps) -> Scan<'_> {
         let index_of_chirp = chirps.number.iter().copied().zip(0..).collect();
         let directions = Directions::new(chirps);
-        Scan { chirps, index_of_chirp, threshold_w: 0.0, directions }
+        Scan { chirps, index_of_chirp, threshold_w: 0.0, returns: Returns::Strongest, directions }
     }
 
     /// The ray of a chirp.
@@ -179,6 +193,37 @@ impl Scan<'_> {
         Some(i64::from(own) - i64::from(nearest))
     }
 
+    /// The points of a cloud with their chirps. Where a chirp reports all its detections, those nearest to the target come
+    /// first.
+    fn in_order<'c, 's>(
+        &self,
+        cloud: &'c Cloud,
+        by_number: bool,
+        shot: impl Fn(u32) -> Option<&'s Shot>,
+    ) -> Vec<(&'c CloudPoint, Option<u32>)> {
+        let mut points = Vec::with_capacity(cloud.points().len());
+        for point in cloud.points() {
+            let chirp = if by_number { point.chirp } else { self.chirp_towards(point.point) };
+            points.push((point, chirp));
+        }
+        if self.returns == Returns::All {
+            points.sort_by_cached_key(|(point, chirp)| {
+                let off_m = chirp.and_then(&shot).map_or(0.0, |shot| off_m(point, shot));
+                // Of distances, which are positive, the bits have the same order.
+                off_m.to_bits()
+            });
+        }
+        points
+    }
+
+    /// Whether a detection away from the target may be of noise: on its chirp's ray, at most 6 dB above the threshold, and the only one
+    /// that its chirp reports. `spoke`: the chirps that have reported one.
+    fn is_alarm(&self, point: &CloudPoint, shot: &Shot, spoke: &mut HashSet<u32>) -> bool {
+        off_ray_m(point, &shot.ray).length() <= ON_RAY_M
+            && point.power_w <= MOST_OVER_THRESHOLD * self.threshold_w
+            && (spoke.insert(shot.chirp) || self.returns == Returns::All)
+    }
+
     /// Assigns points to chirps by their numbers or by their directions. A stray still counts for the target
     /// where it lies on its chirp's ray and near where other chirps meet the target: a wide spot sees past the edge.
     fn assign(&self, cloud: &Cloud, shots: &[Shot], by_number: bool) -> Assignment {
@@ -190,11 +235,12 @@ impl Scan<'_> {
         let mut observations = vec![Observation::default(); shots.len()];
         let (mut strays, mut on_target, mut second) = (Vec::new(), 0, 0);
         let (mut past_the_edge, mut chirps_with_points) = (HashSet::new(), HashSet::new());
-        let (mut alarms, mut spoke) = (Alarms { weight: 1.0, ..Alarms::default() }, HashSet::new());
+        let mut spoke = HashSet::new();
+        let mut alarms = Alarms { weight: 1.0, returns: self.returns, ..Alarms::default() };
         let mut alarm_ranges_m = Vec::new();
-        let most_w = MOST_OVER_THRESHOLD * self.threshold_w;
-        for point in cloud.points() {
-            let chirp = if by_number { point.chirp } else { self.chirp_towards(point.point) };
+        for (point, chirp) in self.in_order(cloud, by_number, |chirp| {
+            shot_of_chirp.get(&chirp).and_then(|index| shots.get(*index))
+        }) {
             chirps_with_points.extend(chirp);
             let index = chirp.and_then(|chirp| shot_of_chirp.get(&chirp).copied());
             if let Some((shot, observation)) =
@@ -203,16 +249,25 @@ impl Scan<'_> {
                 // The chirp meets the target.
                 let range_m = range_m(point, shot);
                 let is_near = off_m(point, shot) <= GATE_M;
-                if is_near && observation.power_w.is_none() {
+                let is_first = observation.power_w.is_none();
+                if is_near && is_first {
                     on_target += 1;
-                    let power_w = Some(point.power_w);
-                    *observation = Observation { power_w, range_m: Some(range_m) };
-                } else if !is_near
-                    && off_ray_m(point, &shot.ray).length() <= ON_RAY_M
-                    && point.power_w <= most_w
-                    && spoke.insert(shot.chirp)
+                    *observation = Observation::detected(point.power_w, Some(range_m));
+                } else if (!is_near || self.returns == Returns::All)
+                    && self.is_alarm(point, shot, &mut spoke)
                 {
-                    alarms.powers_w.push(point.power_w);
+                    match self.returns {
+                        Returns::Strongest if is_first => observation.limit_w = Some(point.power_w),
+                        Returns::First if is_first && range_m < shot.hit.range_m => {
+                            observation.limit_w = Some(NO_LIMIT_W);
+                        }
+                        _ => {}
+                    }
+                    if self.returns == Returns::First {
+                        alarms.of_target += 1;
+                    } else {
+                        alarms.powers_w.push(point.power_w);
+                    }
                 } else {
                     second += usize::from(is_near);
                     strays.push(Stray { shot: Some(*shot), range_m });
@@ -223,13 +278,11 @@ impl Scan<'_> {
                 let shot = sent.map(|index| Shot::missed(self.chirps, index, progress[index]));
                 let range_m = shot.map_or(0.0, |shot| range_m(point, &shot));
                 if let Some(shot) = shot {
-                    let is_past = is_past_an_edge(point, &shot, target.as_ref());
-                    let is_on_ray = off_ray_m(point, &shot.ray).length() <= ON_RAY_M;
-                    if is_past {
+                    if is_past_an_edge(point, &shot, target.as_ref()) {
                         let is_first = past_the_edge.insert(shot.chirp);
                         on_target += usize::from(is_first);
                         second += usize::from(!is_first);
-                    } else if is_on_ray && point.power_w <= most_w && spoke.insert(shot.chirp) {
+                    } else if self.is_alarm(point, &shot, &mut spoke) {
                         alarms.powers_w.push(point.power_w);
                         alarm_ranges_m.push(range_m);
                         continue;
@@ -238,8 +291,15 @@ impl Scan<'_> {
                 strays.push(Stray { shot, range_m });
             }
         }
-        // Silent are the chirps without any detection.
-        alarms.silent = self.chirps.rays.len().saturating_sub(chirps_with_points.len());
+        alarms.silent = match self.returns {
+            // Chirps without any detection.
+            Returns::Strongest => self.chirps.rays.len().saturating_sub(chirps_with_points.len()),
+            Returns::First => (self.chirps.number.iter())
+                .filter(|number| !shot_of_chirp.contains_key(*number))
+                .filter(|number| !chirps_with_points.contains(*number))
+                .count(),
+            Returns::All => self.chirps.rays.len(),
+        };
         let missing: Vec<&Ray<Global>> = self
             .chirps
             .rays

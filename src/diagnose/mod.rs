@@ -64,7 +64,7 @@ mod support;
 mod tests;
 mod trial;
 
-pub use alarms::Alarms;
+pub use alarms::{Alarms, FalseAlarms};
 pub use error::DiagnoseError;
 pub use evidence::{Candidate, Evidence};
 pub use folds::Folds;

@@ -12,6 +12,29 @@ pub struct Observation {
     pub power_w: Option<f64>,
     /// Range, m; `None` where nothing was detected or the cloud has no range.
     pub range_m: Option<f64>,
+    /// Power that an echo without a detection stayed below, W: that of a false alarm which was reported instead, or
+    /// [`NO_LIMIT_W`]; `None` for the threshold.
+    pub limit_w: Option<f64>,
+}
+
+/// Power that no echo reaches, W: a chirp that a nearer detection has ended says nothing of the target.
+pub(super) const NO_LIMIT_W: f64 = 1e6;
+
+impl Observation {
+    /// A detection.
+    pub(super) fn detected(power_w: f64, range_m: Option<f64>) -> Observation {
+        Observation { power_w: Some(power_w), range_m, limit_w: None }
+    }
+
+    /// Power that an echo without a detection stayed below, W.
+    pub(super) fn limit_w(&self, declared: ReceiverLimits) -> f64 {
+        self.limit_w.unwrap_or(declared.threshold_w)
+    }
+
+    /// Received power, or the one that the echo stayed below, W.
+    pub(super) fn level_w(&self, declared: ReceiverLimits) -> f64 {
+        self.power_w.unwrap_or(self.limit_w(declared))
+    }
 }
 
 /// Declared properties of the receiver that no effect changes.

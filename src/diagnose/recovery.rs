@@ -214,7 +214,7 @@ impl Bench<'_> {
             .map(|a| a.range_m + range_sd_m.hypot(a.spread_m) * draws.gaussian())
             .filter(|_| range_sd_m > 0.0);
         if power_w >= threshold_w {
-            Observation { power_w: Some(power_w), range_m }
+            Observation::detected(power_w, range_m)
         } else {
             Observation::default()
         }

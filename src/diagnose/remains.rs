@@ -1,6 +1,7 @@
 //! What a model leaves unexplained, by all tests together.
 
 use super::covariates::covariates;
+use super::evidence::Candidate;
 use super::field::Structure;
 use super::problem::Problem;
 use super::residual::{self, ResidualStructure, speckle_sd_db};
@@ -18,15 +19,15 @@ pub(super) struct Remainder<'a> {
     pub structure: Option<&'a Structure>,
     /// Size of the largest effect of the model, dB.
     pub largest_db: f64,
-    /// Detections far off the target.
-    pub off_target: usize,
+    /// Numbers of detections far off the target, and of those beside an edge that the spot does not reach.
+    pub strays: [usize; 2],
     /// What the strongest effect may hide.
-    pub hidden: &'a [ResidualStructure],
+    pub hidden: &'a [Candidate],
 }
 
 /// Every structure that exceeds chance, strongest first.
 pub(super) fn find_unexplained(scorer: &Scorer, remainder: &Remainder) -> Vec<ResidualStructure> {
-    let Remainder { prediction, z, structure, largest_db, off_target, hidden } = *remainder;
+    let Remainder { prediction, z, structure, largest_db, strays, hidden } = *remainder;
     let Problem { shots, observations, alarms, declared, shared, .. } = scorer.problem;
     let covariates = covariates(shots, prediction, observations);
     let tests = tests(scorer.settings, largest_db);
@@ -34,7 +35,7 @@ pub(super) fn find_unexplained(scorer: &Scorer, remainder: &Remainder) -> Vec<Re
     if let Some(structure) = structure {
         found.extend(residual::of_field(structure));
     }
-    found.extend(hidden.iter().cloned());
+    found.extend(hidden.iter().map(residual::may_be));
     let neighbours = scorer.shared(prediction, z);
     if scorer.is_shared(&neighbours, largest_db) {
         found.push(neighbours);
@@ -44,7 +45,7 @@ pub(super) fn find_unexplained(scorer: &Scorer, remainder: &Remainder) -> Vec<Re
         let covariate = "false alarms".to_owned();
         found.push(ResidualStructure { covariate, strength_db, p_value });
     }
-    found.extend(residual::outliers(z, prediction, declared, observations, off_target));
+    found.extend(residual::outliers(z, prediction, declared, observations, strays));
     let sd_db = speckle_sd_db(prediction.receiver.looks);
     let swing = scorer.swing(prediction, z);
     found.extend(swing.filter(|swing| swing.strength_db >= scorer.least_structure_db(largest_db)));

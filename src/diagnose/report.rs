@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::alarms::FalseAlarms;
 use super::evidence::{Candidate, Evidence};
 use super::residual::ResidualStructure;
 use super::score::Errors;
@@ -289,6 +290,10 @@ pub struct Report {
     /// Detections away from where their chirps meet the target. They are set aside, and their chirps count as
     /// silent.
     pub set_aside: usize,
+    /// Those of them that lie beside an edge of the target, within the reach of the radar's beam.
+    pub beside_edge: usize,
+    /// Detections that noise alone makes. They are not among those set aside.
+    pub false_alarms: FalseAlarms,
     /// Effective number of independent chirps on the target: fewer than there are where neighbours share speckle.
     pub independent_chirps: f64,
     /// Controls of the answer.

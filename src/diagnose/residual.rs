@@ -14,6 +14,7 @@ use serde::Serialize;
 use statrs::function::erf::{erfc, erfc_inv};
 use statrs::function::gamma::digamma;
 
+use super::evidence::Candidate;
 use super::field::Structure;
 use super::folds::{Folds, square};
 use super::likelihood::Likelihood;
@@ -64,7 +65,7 @@ pub(super) fn z(
     let likelihood = Likelihood::new(prediction, declared, &ALONE);
     let mut all = Vec::with_capacity(observations.len());
     for (shot, seen) in observations.iter().enumerate() {
-        let level_w = seen.power_w.unwrap_or(declared.threshold_w);
+        let level_w = seen.level_w(declared);
         let key = Key { seed, chirp: shot as u64, sub_ray: 3, purpose: Purpose::Fit };
         let part = if seen.power_w.is_some() { 1.0 } else { key.draws().uniform() };
         let u = part * likelihood.below(shot, level_w);
@@ -154,20 +155,21 @@ fn outlying_ranges(
 }
 
 /// The most frequent kind of outlier, if there are more than chance has: in power, in range, or a detection far off
-/// the target.
+/// the target or beside an edge of it.
 pub(super) fn outliers(
     z: &[f64],
     prediction: &Prediction,
     declared: ReceiverLimits,
     observations: &[Observation],
-    false_alarms: usize,
+    [off_target, past_the_spot]: [usize; 2],
 ) -> Option<ResidualStructure> {
     let count = z.len().max(1) as f64;
     // Stray detections are not among the shots.
     let kinds = [
         (outlying_powers(z), count, "outlying powers"),
         (outlying_ranges(prediction, declared, observations), count, "outlying ranges"),
-        (false_alarms, count + false_alarms as f64, "stray detections"),
+        (off_target, count + off_target as f64, "stray detections"),
+        (past_the_spot, count + past_the_spot as f64, "detections beside an edge"),
     ];
     let (number, of, covariate) = kinds.into_iter().max_by_key(|(number, ..)| *number)?;
     let share = number as f64 / of;
@@ -216,10 +218,11 @@ pub(super) fn steps(observations: &[Observation]) -> Option<ResidualStructure> {
     })
 }
 
-/// An effect that may be real beside a stronger one: its size, dB, and its held-out gain in standard errors.
-pub(super) fn may_be(effect: &str, strength_db: f64, errors: f64) -> ResidualStructure {
-    let p_value = 0.5 * erfc(errors / SQRT_2);
-    ResidualStructure { covariate: format!("{MAY_BE}{effect}"), strength_db, p_value }
+/// An effect that may be real beside a stronger one.
+pub(super) fn may_be(effect: &Candidate) -> ResidualStructure {
+    let Candidate { name, size_db: strength_db, held_out, .. } = *effect;
+    let p_value = held_out.map_or(1.0, |[gain, se]| 0.5 * erfc(gain / se / SQRT_2));
+    ResidualStructure { covariate: format!("{MAY_BE}{name}"), strength_db, p_value }
 }
 
 /// Structure of the means that a field has found: the covariates with the largest parts.

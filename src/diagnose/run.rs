@@ -72,7 +72,7 @@ impl Diagnosis {
         let members: Vec<&dyn Effect> = effects.iter().flat_map(|effect| family(*effect)).collect();
         let choice = choose_effects(&search, base, &members)?;
         let base = &choice.base;
-        let off_target = detections_off_target(&scorer, subject, &choice.model.state)?;
+        let strays = StrayCounts::of(&scorer, subject, &choice.model.state)?;
         refuse_a_poor_fit(&scorer.errors(&choice.model.state.held_out))?;
 
         notify("controls");
@@ -81,7 +81,7 @@ impl Diagnosis {
         let controls = controls(&search, base, &simplest, numbers_of_controls(&choice.ranking));
 
         notify("testing the remainder");
-        Ok(report(subject, &scorer, &choice, off_target, controls))
+        Ok(report(subject, &scorer, &choice, strays, controls))
     }
 }
 
@@ -90,7 +90,7 @@ fn report(
     subject: &Subject,
     scorer: &Scorer,
     choice: &Choice,
-    off_target: usize,
+    strays: StrayCounts,
     controls: Controls,
 ) -> Report {
     let Choice { base, model, ranking, structure, hidden } = choice;
@@ -99,7 +99,9 @@ fn report(
     let [z_before, z] = [&scorer.predict(base), prediction].map(|prediction| scorer.z(prediction));
     let largest_db = model.largest().size_db;
     let structure = Some(structure).filter(|structure| scorer.is_structured(structure, largest_db));
-    let remainder = Remainder { prediction, z: &z, structure, largest_db, off_target, hidden };
+    let strays_left = [strays.off_target, strays.past_the_spot];
+    let remainder =
+        Remainder { prediction, z: &z, structure, largest_db, strays: strays_left, hidden };
     let unexplained = find_unexplained(scorer, &remainder);
     // Held-out errors without and with the effects, and with the field.
     let errors = [&base.held_out, held_out].map(|held_out| scorer.errors(held_out));
@@ -118,6 +120,8 @@ fn report(
         unexplained,
         error: answer::before_after(scorer, errors, with_unknown),
         set_aside: subject.strays.len(),
+        beside_edge: strays.beside_edge,
+        false_alarms: subject.alarms.counted(&subject.receiver, subject.declared),
         independent_chirps: scorer.problem.independent_shots(),
         controls,
         base: answer::base(subject, &model.state, &sd),
@@ -140,22 +144,40 @@ fn refuse_another_target(scorer: &Scorer, base: &State) -> Result<(), DiagnoseEr
     Ok(())
 }
 
-/// Number of detections off the target, or a refusal if they are many. Detections past an edge are assigned to a wide
-/// spot at first, which the model may not have.
-fn detections_off_target(
-    scorer: &Scorer,
-    subject: &Subject,
-    state: &State,
-) -> Result<usize, DiagnoseError> {
-    let model = state.space.model(scorer.problem.receiver, &state.fit.at);
-    let strays = subject.strays.iter();
-    let off = strays.filter(|stray| !stray.is_on_target(&model, subject.stage)).count();
-    let off = subject.alarms.beyond_chance(off);
-    let points = subject.strays.len() + subject.detected();
-    if off as f64 > MOST_STRAYS * points as f64 {
-        return Err(DiagnoseError::Elsewhere { matched: points - off, points });
+/// How many of the detections that belong to no shot are where.
+#[derive(Clone, Copy)]
+struct StrayCounts {
+    /// Beside an edge of the target, within the reach of the radar's beam.
+    beside_edge: usize,
+    /// Those of them that the spot of the model does not reach, such as a single ray.
+    past_the_spot: usize,
+    /// Off the target, but for those that chance has near it.
+    off_target: usize,
+}
+
+impl StrayCounts {
+    /// Of a model, or a refusal if many are off the target.
+    fn of(scorer: &Scorer, subject: &Subject, state: &State) -> Result<StrayCounts, DiagnoseError> {
+        let model = state.space.model(scorer.problem.receiver, &state.fit.at);
+        let mut counts = StrayCounts { beside_edge: 0, past_the_spot: 0, off_target: 0 };
+        for stray in subject.strays {
+            let is_beside_edge = stray.is_beside_edge(&model, subject.stage);
+            let is_missed = usize::from(!stray.is_on_target(&model, subject.stage));
+            if is_beside_edge {
+                counts.beside_edge += 1;
+                counts.past_the_spot += is_missed;
+            } else {
+                counts.off_target += is_missed;
+            }
+        }
+        counts.off_target = subject.alarms.beyond_chance(counts.off_target);
+        let points = subject.strays.len() + subject.detected();
+        if counts.off_target as f64 > MOST_STRAYS * points as f64 {
+            let matched = points - counts.off_target;
+            return Err(DiagnoseError::Elsewhere { matched, points });
+        }
+        Ok(counts)
     }
-    Ok(off)
 }
 
 /// Refuses a model that is far from the data with all effects found.

@@ -61,7 +61,8 @@ impl MeasuredScene<'_> {
         stage.middle = middle(&shots);
         // The cloud against the chirps.
         let (receiver, declared) = declared_receiver(radar);
-        let mut matched = match_cloud(cloud, &scene.chirps, &shots, declared.threshold_w)?;
+        let mut matched =
+            match_cloud(cloud, &scene.chirps, &shots, declared.threshold_w, radar.returns)?;
         matched.alarms.cells = radar.gate_cells();
         matched.alarms.looks = radar.noise_looks();
         let subject = Subject {

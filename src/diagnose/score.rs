@@ -134,7 +134,7 @@ pub(super) fn scores(
     let mut scores = Vec::with_capacity(seen.len());
     for ((shot, seen), (term, whole)) in seen.into_iter().zip(terms.iter().zip(&whole)) {
         let [mean, variance] = detected_moments(&likelihood, &table, prediction, declared, shot);
-        let missed = likelihood.below(shot, declared.threshold_w);
+        let missed = likelihood.below(shot, seen.limit_w(declared));
         let share = seen
             .power_w
             .map(|power_w| (likelihood.below(shot, power_w) - missed) / (1.0 - missed).max(1e-300));

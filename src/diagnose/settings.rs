@@ -19,6 +19,9 @@ pub struct Diagnosis {
     pub folds: usize,
     /// Most effects that are added.
     pub most_effects: usize,
+    /// How often the search begins. If the base is then at a better place again that could change the answer, it has
+    /// failed.
+    pub most_starts: usize,
     /// Gain in ln likelihood that an effect with one parameter needs to be considered. 5 occurs by chance
     /// once in about 640.
     pub least_gain: f64,
@@ -55,6 +58,7 @@ impl Default for Diagnosis {
             block_m: 0.05,
             folds: 5,
             most_effects: 4,
+            most_starts: 4,
             least_gain: 5.0,
             standard_errors: 2.0,
             least_size_db: 0.1,

@@ -294,7 +294,7 @@ mod tests {
     }
 
     fn found(z: &[f64]) -> SharedSpeckle {
-        let seen = Observation { power_w: Some(1e-9), range_m: None };
+        let seen = Observation::detected(1e-9, None);
         SharedSpeckle::of(z, &vec![seen; z.len()], &shots(), SPOT_M)
     }
 

@@ -120,12 +120,7 @@ impl<'j, 'p, 'a> Judge<'j, 'p, 'a> {
     /// Whether an effect on the scatter only stands for structure of the means.
     fn is_structure_of_means(&self, trial: &Trial) -> bool {
         let structure = self.structure.get_or_init(|| self.scorer.structure(self.state));
-        let shared_db = *self.shared_db.get_or_init(|| {
-            let prediction = self.scorer.predict(self.state);
-            let z = self.scorer.z(&prediction);
-            let swing_db = self.scorer.swing(&prediction, &z).map_or(0.0, |one| one.strength_db);
-            self.scorer.shared(&prediction, &z).strength_db.max(swing_db)
-        });
+        let shared_db = *self.shared_db.get_or_init(|| self.scorer.fine_structure_db(self.state));
         let with = self.scorer.ln_likelihood_with(&trial.space, &trial.fit, structure);
         let without = self.scorer.ln_likelihood_with(&self.state.space, &self.state.fit, structure);
         let Candidate { gain, size_db, .. } = trial.candidate;

@@ -3,15 +3,25 @@
 
 use glam::DVec3;
 
+use super::choose::choose_effects;
+use super::likelihood::Likelihood;
+use super::observation::NO_LIMIT_W;
+use super::problem::{ENOUGH, Problem, Sample};
+use super::refit::Fit;
+use super::scorer::Scorer;
+use super::shared::ALONE;
+use super::space::Space;
+use super::trial::Search;
 use super::*;
 use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Shadowing};
 use crate::effects::{
-    About, Effect, EffectParameter, Level, Model, Place, Receiver, Shot, Stage, find,
+    About, Effect, EffectParameter, Level, Model, Place, PredictionCache, Receiver, Shot, Stage,
+    find,
 };
 use crate::frames::{Point, Ray};
 use crate::geometry::Mesh;
 use crate::radar::random::{Key, Purpose};
-use crate::radar::{Chirps, Link, Radar};
+use crate::radar::{Chirps, Link, Radar, Returns};
 use crate::scene::solids;
 use crate::trace::{Bvh, ScanGeometry};
 use crate::units::{db_from_ratio, watts_from_dbm};
@@ -66,7 +76,7 @@ fn chirps(radar: &Radar) -> crate::radar::Chirps {
 }
 
 /// An effect that changes the gain over the shots.
-struct Gain {
+pub(super) struct Gain {
     about: About,
     db: fn(&Shot) -> f64,
 }
@@ -88,8 +98,9 @@ impl Gain {
     }
 }
 
-static BOWL: Gain = Gain::new("bowl", |shot| (shot.xt_m.powi(2) + shot.yt_m.powi(2)) / 0.25);
-static DRIFT: Gain = Gain::new("drift", |shot| shot.progress - 0.5);
+pub(super) static BOWL: Gain =
+    Gain::new("bowl", |shot| (shot.xt_m.powi(2) + shot.yt_m.powi(2)) / 0.25);
+pub(super) static DRIFT: Gain = Gain::new("drift", |shot| shot.progress - 0.5);
 static SLANT: Gain = Gain::new("slant", |shot| shot.xt_m);
 /// A slant with a step, and the step where it is in the middle rows alone.
 static BENT: Gain = Gain::new("bent", |shot| shot.xt_m + 0.1 * shot.xt_m.signum());
@@ -154,6 +165,70 @@ impl Bench {
     }
 }
 
+/// Four looks in weak noise.
+fn receiver() -> Receiver {
+    Receiver { looks: 4.0, noise_w: watts_from_dbm(-100.0), ..Receiver::LINEAR }
+}
+
+fn declared() -> ReceiverLimits {
+    ReceiverLimits { threshold_w: watts_from_dbm(-77.0), range_sd_m: RANGE_SD_M }
+}
+
+/// The law where searches begin.
+fn near_law() -> Brdf {
+    let mut start = law();
+    start.set_parameter("specular.m", 0.08);
+    start
+}
+
+/// What is observed of a truth with these effects.
+fn observed(
+    stage: &Stage,
+    shots: &[Shot],
+    effects: Vec<(&'static dyn Effect, Vec<f64>)>,
+    seed: u64,
+) -> Vec<Observation> {
+    let (receiver, declared) = (receiver(), declared());
+    let model = Model { laws: vec![law()], receiver, effects, level: 1.0 };
+    let prediction = model.predict(stage, shots);
+    let seen = |(shot, arrived): (usize, &Option<crate::effects::MeanEcho>)| {
+        let Some(arrived) = arrived else { return Observation::default() };
+        let key = Key { seed, chirp: shot as u64, sub_ray: 0, purpose: Purpose::Speckle };
+        let mut draws = key.draws();
+        let power_w = (arrived.power_w + receiver.noise_w) * draws.gamma(receiver.looks);
+        let range_m = arrived.range_m + RANGE_SD_M * draws.gaussian();
+        if power_w >= declared.threshold_w {
+            Observation::detected(power_w, Some(range_m))
+        } else {
+            Observation::default()
+        }
+    };
+    prediction.arrived.iter().enumerate().map(seen).collect()
+}
+
+/// Hands on a search in a scan whose truth has one effect, and the space of its laws without effects.
+pub(super) fn searched(
+    (effect, value): (&'static dyn Effect, f64),
+    settings: &Diagnosis,
+    check: &dyn Fn(&Search, Space),
+) {
+    let bench = Bench::new(target());
+    let stage = &bench.stage();
+    let shots = &trace_shots(stage).unwrap()[..];
+    let observations = &observed(stage, shots, vec![(effect, vec![value])], settings.seed)[..];
+    let (receiver, declared, laws) = (receiver(), declared(), [near_law()]);
+    let (alarms, shared) = (&Alarms::default(), &ALONE);
+    let traced = &PredictionCache::default();
+    let problem =
+        Problem { stage, shots, observations, declared, receiver, alarms, shared, traced };
+    let Diagnosis { block_m, folds, seed, .. } = *settings;
+    let folds = &Folds::new(shots, block_m, folds, seed);
+    let (scorer, sample) = (Scorer { problem, folds, settings }, &Sample::new(&problem, ENOUGH));
+    let mut space = Space::new(shots, receiver.looks, &laws, &[]).unwrap();
+    space.ln_level = Some(problem.ln_level(&space));
+    check(&Search { scorer, sample, notify: &|_| () }, space);
+}
+
 /// The report on a scan whose truth has these effects with all their parameters, searched in a library.
 fn diagnosed_of(
     library: &[&'static dyn Effect],
@@ -163,26 +238,9 @@ fn diagnosed_of(
     let bench = Bench::new(target());
     let stage = bench.stage();
     let shots = trace_shots(&stage).unwrap();
-    let noise_w = watts_from_dbm(-100.0);
-    let receiver = Receiver { looks: 4.0, noise_w, ..Receiver::LINEAR };
-    let declared = ReceiverLimits { threshold_w: watts_from_dbm(-77.0), range_sd_m: RANGE_SD_M };
-    let model = Model { laws: vec![law()], receiver, effects, level: 1.0 };
-    let prediction = model.predict(&stage, &shots);
-    let seen = |(shot, arrived): (usize, &Option<crate::effects::MeanEcho>)| {
-        let Some(arrived) = arrived else { return Observation::default() };
-        let key = Key { seed, chirp: shot as u64, sub_ray: 0, purpose: Purpose::Speckle };
-        let mut draws = key.draws();
-        let power_w = (arrived.power_w + noise_w) * draws.gamma(receiver.looks);
-        let range_m = arrived.range_m + RANGE_SD_M * draws.gaussian();
-        if power_w >= declared.threshold_w {
-            Observation { power_w: Some(power_w), range_m: Some(range_m) }
-        } else {
-            Observation::default()
-        }
-    };
-    let observations: Vec<Observation> = prediction.arrived.iter().enumerate().map(seen).collect();
-    let mut start = law();
-    start.set_parameter("specular.m", 0.08);
+    let (receiver, declared) = (receiver(), declared());
+    let observations = observed(&stage, &shots, effects, seed);
+    let start = near_law();
     let (shots, observations, laws) = (&shots[..], &observations[..], &[start][..]);
     let subject = Subject {
         stage: &stage,
@@ -267,6 +325,38 @@ fn two_missing_effects_are_both_found() {
     let mut names: Vec<&str> = report.effects.iter().map(|e| e.name).collect();
     names.sort_unstable();
     assert_eq!(names, ["bowl", "drift"], "{report:#?}");
+}
+
+#[test]
+fn a_weak_effect_beside_a_strong_one_gets_no_name() {
+    let report = diagnosed(&[(&BOWL, -7.5), (&DRIFT, 1.5)], 7);
+    let names: Vec<&str> = report.effects.iter().map(|e| e.name).collect();
+    assert_eq!((names, report.verdict), (vec!["bowl"], Verdict::Unexplained), "{report:#?}");
+    let hidden = report.unexplained.iter().find(|one| one.covariate == "may be drift").unwrap();
+    // A slope of 1.5 dB over the scan has 0.43 dB.
+    assert!((hidden.strength_db - 0.43).abs() < 0.15 && hidden.p_value < 1e-3, "{hidden:?}");
+    // Alone it has a name.
+    let report = diagnosed(&[(&DRIFT, 1.5)], 7);
+    assert_eq!(report.effects.first().map(|e| e.name), Some("drift"), "{report:#?}");
+}
+
+#[test]
+fn a_search_that_finds_better_laws_at_each_start_has_failed() {
+    for (most_starts, fails) in [(1, true), (4, false)] {
+        let settings = Diagnosis { seed: 3, most_starts, ..Diagnosis::default() };
+        searched((&BOWL, -4.0), &settings, &|search, space| {
+            // The laws as stored, which nobody has fitted.
+            let at = space.start();
+            let ln_likelihood = search.scorer.problem.ln_likelihood(&space, &at);
+            let fit = Fit { at, ln_likelihood, converged: false, is_stuck: false };
+            let base = search.scorer.state(space, fit);
+            let chosen = choose_effects(search, base, &LIBRARY);
+            match chosen.map(|choice| choice.model.added.len()) {
+                Err(DiagnoseError::SearchFailed { gain }) => assert!(fails && gain > 5.0),
+                chosen => assert!(!fails && chosen.is_ok_and(|added| added == 1)),
+            }
+        });
+    }
 }
 
 /// The shift is farther than a search by powers leads, which jump at every facet.
@@ -387,7 +477,7 @@ fn a_scan_with_too_little_says_so() {
         pose: &[],
     };
     let refused = |powers_w: &dyn Fn(usize) -> f64| {
-        let seen = |shot| Observation { power_w: Some(powers_w(shot)), range_m: None };
+        let seen = |shot| Observation::detected(powers_w(shot), None);
         let observations: Vec<Observation> = (0..shots.len()).map(seen).collect();
         let subject = Subject { observations: &observations, ..subject };
         Diagnosis::default().run(&subject, &LIBRARY).unwrap_err()
@@ -423,7 +513,7 @@ fn a_cloud_finds_its_shots() {
     let numbered = Cloud::new(points.clone()).unwrap();
     points.push(point(&shots[9], missed, 0.0));
     let cloud = Cloud::new(points.clone()).unwrap();
-    let found = match_cloud(&cloud, chirps, &shots, THRESHOLD_W).unwrap();
+    let found = match_cloud(&cloud, chirps, &shots, THRESHOLD_W, Returns::Strongest).unwrap();
     let [behind, beside] = &found.strays[..] else { panic!("{:?}", found.strays) };
     assert_eq!(behind.shot, Some(shots[8]));
     assert!((behind.range_m - shots[8].hit.range_m - 0.5).abs() < 1e-9);
@@ -433,7 +523,8 @@ fn a_cloud_finds_its_shots() {
     points.pop();
     points.iter_mut().for_each(|point| point.chirp = None);
     let cloud = Cloud::new(points.clone()).unwrap();
-    let by_direction = match_cloud(&cloud, chirps, &shots, THRESHOLD_W).unwrap();
+    let by_direction =
+        match_cloud(&cloud, chirps, &shots, THRESHOLD_W, Returns::Strongest).unwrap();
     assert_eq!(by_direction.observations, found.observations);
     // Points with the numbers of other chirps are refused.
     for off in [1, -1] {
@@ -441,7 +532,13 @@ fn a_cloud_finds_its_shots() {
         for point in &mut points {
             point.chirp = point.chirp.and_then(|chirp| chirp.checked_add_signed(off));
         }
-        let refused = match_cloud(&Cloud::new(points).unwrap(), chirps, &shots, THRESHOLD_W);
+        let refused = match_cloud(
+            &Cloud::new(points).unwrap(),
+            chirps,
+            &shots,
+            THRESHOLD_W,
+            Returns::Strongest,
+        );
         let Err(DiagnoseError::Misnumbered { off: found }) = refused else { panic!("{refused:?}") };
         assert_eq!(found, i64::from(off));
     }
@@ -460,12 +557,14 @@ fn a_cloud_finds_its_shots() {
             .iter()
             .map(|point| CloudPoint { chirp: point.chirp.map(|chirp| chirp + first), ..*point });
         let cloud = Cloud::new(of_pass.collect()).unwrap();
-        let found = match_cloud(&cloud, &passes, &shots_twice, THRESHOLD_W).unwrap();
+        let found =
+            match_cloud(&cloud, &passes, &shots_twice, THRESHOLD_W, Returns::Strongest).unwrap();
         assert_eq!(found.observations.iter().filter(|o| o.power_w.is_some()).count(), 8);
     }
     // Row numbers in place of chirp numbers are refused.
     let given = |points: Vec<CloudPoint>| {
-        match_cloud(&Cloud::new(points).unwrap(), chirps, &shots, THRESHOLD_W).unwrap_err()
+        match_cloud(&Cloud::new(points).unwrap(), chirps, &shots, THRESHOLD_W, Returns::Strongest)
+            .unwrap_err()
     };
     let on_target = &numbered.points()[..8];
     let rows =
@@ -488,10 +587,57 @@ fn a_cloud_finds_its_shots() {
     assert!(matches!(twice, DiagnoseError::Repeated { second: 8, points: 16 }), "{twice}");
     // A cloud of something else is refused.
     points.iter_mut().for_each(|p| p.point = Point::from(p.point.xyz + DVec3::new(0.0, 0.0, 3.0)));
-    let elsewhere = match_cloud(&Cloud::new(points).unwrap(), chirps, &shots, THRESHOLD_W);
+    let elsewhere =
+        match_cloud(&Cloud::new(points).unwrap(), chirps, &shots, THRESHOLD_W, Returns::Strongest);
     assert!(matches!(elsewhere, Err(DiagnoseError::Elsewhere { matched: 0, points: 9 })));
     assert!((found.observations[20].power_w.unwrap() - 1e-9).abs() < 1e-20);
     assert!((found.observations[20].range_m.unwrap() - shots[20].hit.range_m - 1e-3).abs() < 1e-9);
+}
+
+#[test]
+fn a_false_alarm_at_the_target_says_what_its_kind_of_return_says() {
+    use crate::measure::cloud::{Cloud, CloudPoint};
+    let bench = Bench::new(target());
+    let (stage, chirps) = (bench.stage(), &bench.chirps);
+    let shots = trace_shots(&stage).unwrap();
+    let point = |shot: usize, off_m: f64, power_w: f64| {
+        let Shot { ray, hit, chirp, .. } = shots[shot];
+        let xyz = ray.origin.xyz + (hit.range_m + off_m) * ray.direction.xyz();
+        CloudPoint { chirp: Some(chirp), point: Point::from(xyz), range_m: None, power_w }
+    };
+    let weak_w = 1.5 * THRESHOLD_W;
+    // The false alarms lie before and behind the target, where nothing else is detected.
+    let [before, behind] = [40, 41];
+    let mut points = vec![point(before, -0.5, weak_w), point(behind, 0.5, weak_w)];
+    points.extend((20..28).map(|shot| point(shot, 1e-3, 1e-9)));
+    let matched = |points: &[CloudPoint], returns| {
+        let cloud = Cloud::new(points.to_vec()).unwrap();
+        match_cloud(&cloud, chirps, &shots, THRESHOLD_W, returns).unwrap()
+    };
+    let limits = |found: &CloudMatch| [before, behind].map(|shot| found.observations[shot].limit_w);
+    let strongest = matched(&points, Returns::Strongest);
+    assert_eq!(limits(&strongest), [Some(weak_w); 2]);
+    let count = |found: &CloudMatch| [found.alarms.count(), found.alarms.powers_w.len()];
+    let sent = chirps.rays.len();
+    assert_eq!((count(&strongest), strongest.alarms.silent), ([2, 2], sent - points.len()));
+    let first = matched(&points, Returns::First);
+    assert_eq!(limits(&first), [Some(NO_LIMIT_W), None]);
+    assert_eq!((count(&first), first.alarms.silent), ([2, 0], sent - shots.len()));
+    // Several detections of a chirp: the nearest to the target is the echo, in whatever order they come.
+    points.insert(0, point(21, -0.05, weak_w));
+    points.extend([point(20, -0.5, weak_w), point(20, 0.5, weak_w)]);
+    let all = matched(&points, Returns::All);
+    assert_eq!(limits(&all), [None; 2]);
+    assert_eq!((count(&all), all.alarms.silent, all.strays.len()), ([5, 5], sent, 0));
+    assert_eq!(all.observations[20..28], first.observations[20..28]);
+    // What a limit makes likely: silence least, and a hidden echo whatever it is.
+    let model = Model { laws: vec![law()], receiver: receiver(), effects: vec![], level: 1.0 };
+    let prediction = model.predict(&stage, &shots);
+    let seen = [None, Some(prediction.mean_w(before)), Some(NO_LIMIT_W)]
+        .map(|limit_w| (before, Observation { limit_w, ..Observation::default() }));
+    let terms = Likelihood::new(&prediction, declared(), &ALONE).terms_of(&seen);
+    assert!(terms[0].ln_p < terms[1].ln_p - 0.01 && terms[1].ln_p < terms[2].ln_p, "{terms:?}");
+    assert!(terms[2].ln_p.abs() < 1e-3 && terms[2].slope.abs() < 1e-9, "{:?}", terms[2]);
 }
 
 #[test]
@@ -519,16 +665,22 @@ fn a_wide_spot_sees_past_the_edge() {
         Cloud::new(chirps.number.iter().zip(&chirps.rays).filter_map(point).collect()).unwrap()
     };
     let seen = cloud(0.0);
-    let found = match_cloud(&seen, chirps, &shots, THRESHOLD_W).unwrap();
+    let found = match_cloud(&seen, chirps, &shots, THRESHOLD_W, Returns::Strongest).unwrap();
     assert!(found.strays.len() * 3 > seen.points().len(), "{}", found.strays.len());
+    // The radar's own beam, of 16 mm, reaches some of them, of the 80 mm beside the plate.
+    let model = Model { laws: vec![law()], receiver: receiver(), effects: vec![], level: 1.0 };
+    let beside = found.strays.iter().filter(|stray| stray.is_beside_edge(&model, &stage)).count();
+    let share = beside as f64 / found.strays.len() as f64;
+    assert!((0.1..0.4).contains(&share), "{share}");
     // Twice as often, and half a metre behind, they are not of it.
     let stray = |point: &&CloudPoint| shots.iter().all(|shot| Some(shot.chirp) != point.chirp);
     let strays: Vec<CloudPoint> = seen.points().iter().filter(stray).copied().collect();
     let mut twice = [seen.points(), &strays, &strays].concat();
     twice.iter_mut().for_each(|point| point.chirp = None);
     let twice = Cloud::new(twice).unwrap();
-    let twice = match_cloud(&twice, chirps, &shots, THRESHOLD_W).unwrap_err();
+    let twice = match_cloud(&twice, chirps, &shots, THRESHOLD_W, Returns::Strongest).unwrap_err();
     assert!(matches!(twice, DiagnoseError::Repeated { .. }), "{twice}");
-    let behind = match_cloud(&cloud(0.5), chirps, &shots, THRESHOLD_W).unwrap_err();
+    let behind =
+        match_cloud(&cloud(0.5), chirps, &shots, THRESHOLD_W, Returns::Strongest).unwrap_err();
     assert!(matches!(behind, DiagnoseError::Elsewhere { matched: 0, .. }), "{behind}");
 }

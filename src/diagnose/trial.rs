@@ -402,3 +402,42 @@ fn of_all_strengths(effect: &dyn Effect, start: &DVector<f64>) -> [DVector<f64>;
 fn sort(trials: &mut [Trial]) {
     trials.sort_by(|a, b| b.candidate.gain.total_cmp(&a.candidate.gain));
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::Diagnosis;
+    use crate::diagnose::tests::{BOWL, DRIFT, searched};
+
+    /// A drift at its starts.
+    fn trial<'a>(search: &Search, state: &State<'a>) -> Trial<'a> {
+        search.promise(state, &search.screen(state), &DRIFT, 1).unwrap()
+    }
+
+    #[test]
+    fn the_first_effect_is_also_searched_from_the_laws_as_declared() {
+        let settings = Diagnosis { seed: 5, ..Diagnosis::default() };
+        searched((&BOWL, -6.0), &settings, &|search, space| {
+            let (declared, base) = (space.start(), search.scorer.base(search.sample, space));
+            let first = trial(search, &base);
+            let laws = base.space.base_len() - 1;
+            let far = &first.starts.last().unwrap().at;
+            assert!(first.has_far_start);
+            assert_eq!(far.rows(0, laws), declared.rows(0, laws));
+            assert!((far.rows(0, laws) - base.fit.at.rows(0, laws)).norm() > 0.05);
+            // It is at least as likely as the starts of the effect.
+            let screen = search.screen(&base);
+            for value in [0.3, -0.3] {
+                let start = Space::joined(&base.space.restarted(&base.fit.at), &DRIFT, &[value]);
+                let gains = [far, &start].map(|at| screen.gain(&first.space, at));
+                assert!(gains[0] >= gains[1] - 1e-9, "{gains:?}");
+            }
+            // Beside an effect only laws that the data leave open are.
+            let with = base.space.with(&BOWL);
+            let start = Space::joined(&base.fit.at, &BOWL, &[-6.0]);
+            let fit = search.scorer.problem.fit(&with, &start, &[], &SEARCH);
+            let with = search.scorer.state(with, fit);
+            assert_eq!(trial(search, &with).has_far_start, search.screen(&with).leaves_laws_open);
+        });
+    }
+}

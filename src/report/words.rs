@@ -170,6 +170,10 @@ pub(super) fn covariate(name: &str) -> (String, &'static str) {
             "detections beside the target",
             "The receiver's noise is another one than declared, or something else is in its gate.",
         ),
+        "detections beside an edge" => (
+            "detections beside an edge",
+            "The beam is wider than the ray that stands for it: give the scene several, `spot.rays`.",
+        ),
         "stray detections" => ("detections off the target", "False alarms, or a mesh that is cut."),
         "form of the scatter" => {
             ("form of the scatter", "The fluctuation follows another law than speckle.")

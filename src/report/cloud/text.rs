@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::places::{self, Peak};
-use crate::diagnose::{Errors, FoundEffect, Report};
+use crate::diagnose::{Errors, FalseAlarms, FoundEffect, Report};
 use crate::formats::words::{listed, plus_minus, uncapitalised};
 use crate::report::words::{covariate, gone, numbers, others, sentence, summary, verdict};
 
@@ -30,10 +30,12 @@ pub(super) fn text(report: &Report, peaks: &[Peak], files: &[String], folder: &P
     }
     if report.set_aside > 0 {
         text += &format!(
-            "set aside: {} detections that lie elsewhere than their chirps meet the target\n",
-            report.set_aside
+            "set aside: {} detections that lie elsewhere than their chirps meet the target{}\n",
+            report.set_aside,
+            beside_edge(report.beside_edge)
         );
     }
+    text += &false_alarms(&report.false_alarms);
     if report.independent_chirps < report.rows.len() as f64 {
         text += &format!(
             "neighbours share speckle: the {} chirps on the target count as {:.0}\n",
@@ -47,6 +49,28 @@ pub(super) fn text(report: &Report, peaks: &[Peak], files: &[String], folder: &P
         text += &format!("tried and not supported: {}\n", listed(&not_found));
     }
     text + &written(files, folder)
+}
+
+/// How many of the detections that were set aside lie beside an edge; nothing for none.
+fn beside_edge(count: usize) -> String {
+    if count == 0 {
+        return String::new();
+    }
+    format!(", {count} of them beside an edge, within the reach of the beam")
+}
+
+/// How many detections count as false alarms; nothing where none does and the noise predicts less than one.
+fn false_alarms(alarms: &FalseAlarms) -> String {
+    let FalseAlarms { counted, expected } = *alarms;
+    match expected {
+        Some(expected) if counted > 0 || expected >= 1.0 => {
+            format!(
+                "false alarms: {counted} detections; the declared noise predicts {expected:.1}\n"
+            )
+        }
+        None if counted > 0 => format!("false alarms: {counted} detections\n"),
+        _ => String::new(),
+    }
 }
 
 fn effect(found: &FoundEffect) -> String {
