@@ -2,7 +2,11 @@
 //!
 //! The residuals, of silent chirps too, have at their places among the chirps a spectrum that is flat under a correct model:
 //! each line over the mean of its neighbours follows an exponential law. A line far above is a swing in time, which covariates
-//! of place and angle do not show. Chirps that share speckle have lines at the turns of the mirror, and are not tested.
+//! of place and angle do not show.
+//!
+//! Chirps that share speckle have a spectrum with lines at the turns of the mirror. It is the transform of what pairs of
+//! shots share by the distance of their chirp numbers, at a level that the lines tell, over a flat one for the rest. The
+//! levels are the likeliest (Whittle), and each line counts over the level of its place.
 
 use std::f64::consts::LN_2;
 
@@ -24,6 +28,10 @@ const CHANCE: f64 = 1e-4;
 const MOST_PLACES: usize = 64;
 /// Largest residual that counts, in standard deviations.
 const MOST: f64 = 3.5;
+/// Steps of the search for the levels of the two spectra.
+const STEPS: usize = 200;
+/// Least level of a line, as a share of the mean: of the shared part a transform may be below 0 by rounding.
+const LEAST: f64 = 1e-3;
 
 /// The strongest swing, if chance does not explain it. `sd_db`: scatter of a correct model, dB.
 pub(super) fn swing(
@@ -32,9 +40,6 @@ pub(super) fn swing(
     shared: &SharedSpeckle,
     sd_db: f64,
 ) -> Option<ResidualStructure> {
-    if shared.is_any() {
-        return None;
-    }
     let count = z.len() as f64;
     let inner: Vec<f64> = z.iter().map(|z| z.clamp(-MOST, MOST)).collect();
     let mean = inner.iter().sum::<f64>() / count;
@@ -44,24 +49,64 @@ pub(super) fn swing(
     if places > MOST_PLACES * shots.len() {
         return None;
     }
-    let mut signal = vec![Complex::from(0.0); places];
+    let mut signal = vec![0.0; places];
     for (shot, z) in shots.iter().zip(&inner) {
         signal[(shot.chirp - first) as usize] += z - mean;
     }
-    FftPlanner::new().plan_fft_forward(places).process(&mut signal);
-    // Neither the mean nor the highest line of an even number of places, which is real.
-    let lines: Vec<f64> =
-        signal.iter().skip(1).take((places - 1) / 2).map(|line| line.norm_sqr() / count).collect();
+    let lines: Vec<f64> = transform(&signal).map(|line| line.norm_sqr() / count).collect();
     if lines.len() <= 2 * AROUND {
         return None;
     }
-    let found = (0..lines.len()).map(|line| Line::of(&lines, line));
-    let strongest = found.min_by(|a, b| a.chance.total_cmp(&b.chance))?;
-    let p_value = (lines.len() as f64 * strongest.chance).min(1.0);
+    let background = if shared.is_any() {
+        let by_lag = shared.by_lag(shots, places);
+        let of_shared: Vec<f64> =
+            transform(&by_lag).map(|line| (line.re / count).max(LEAST)).collect();
+        levels(&lines, &of_shared)
+    } else {
+        vec![1.0; lines.len()]
+    };
+    let flat: Vec<f64> = lines.iter().zip(&background).map(|(line, level)| line / level).collect();
+    let found = (0..flat.len()).map(|line| (line, Line::of(&flat, line)));
+    let (place, strongest) = found.min_by(|a, b| a.1.chance.total_cmp(&b.1.chance))?;
+    let p_value = (flat.len() as f64 * strongest.chance).min(1.0);
     // A swing of amplitude a in z has a line of n·a²/4.
-    let strength_db = sd_db * (2.0 * (strongest.power - strongest.level).max(0.0) / count).sqrt();
+    let beyond = background[place] * (strongest.power - strongest.level).max(0.0);
+    let strength_db = sd_db * (2.0 * beyond / count).sqrt();
     let covariate = "order of the chirps".to_owned();
     (p_value < CHANCE).then_some(ResidualStructure { covariate, strength_db, p_value })
+}
+
+/// The lines of a signal's spectrum, but for its mean and the highest of an even number of places, which is real.
+fn transform(signal: &[f64]) -> impl Iterator<Item = Complex<f64>> {
+    let places = signal.len();
+    let mut lines: Vec<Complex<f64>> = signal.iter().map(|value| Complex::from(*value)).collect();
+    FftPlanner::new().plan_fft_forward(places).process(&mut lines);
+    lines.into_iter().skip(1).take(places.saturating_sub(1) / 2)
+}
+
+/// The likeliest mean of every line as a sum of a flat spectrum and another one, by multiplicative steps (Févotte, Bertin
+/// & Durrieu 2009, DOI 10.1162/neco.2008.04-08-771).
+fn levels(lines: &[f64], of_shared: &[f64]) -> Vec<f64> {
+    let mut weights = [0.5; 2];
+    for _ in 0..STEPS {
+        let [mut more, mut less] = [[0.0; 2]; 2];
+        for (line, shared) in lines.iter().zip(of_shared) {
+            let level = level(weights, *shared);
+            for (part, share) in [1.0, *shared].into_iter().enumerate() {
+                more[part] += share * line / (level * level);
+                less[part] += share / level;
+            }
+        }
+        for part in 0..2 {
+            weights[part] *= more[part] / less[part];
+        }
+    }
+    of_shared.iter().map(|shared| level(weights, *shared)).collect()
+}
+
+/// Level of a line from those of a flat spectrum and of the shared one.
+fn level([flat, of_shared]: [f64; 2], shared: f64) -> f64 {
+    (flat + of_shared * shared).max(f64::MIN_POSITIVE)
 }
 
 /// A line of the spectrum.
@@ -91,6 +136,7 @@ impl Line {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::observation::Observation;
     use crate::diagnose::shared::ALONE;
     use crate::radar::random::{Key, Purpose};
     use crate::radar::{Chirps, Radar};
@@ -118,6 +164,58 @@ mod tests {
             assert!((0.6..1.2).contains(&share), "{period}: {swing:?}");
         }
         assert!((10..110).all(|seed| found(0.0, 10.0, seed).is_none()));
+    }
+
+    /// Shots along lines to and fro, 6 mm apart, of spots of 16 mm; `swing`: amplitude of a swing of 310 chirps.
+    fn found_in_shared(swing_of: f64, seed: u64) -> Option<ResidualStructure> {
+        const SIDE: usize = 80;
+        const STEP_M: f64 = 0.006;
+        let radar = Radar::default();
+        let chirps = Chirps::draw(&radar, |_| Err("no file".to_owned())).unwrap();
+        let shot = |index: usize| {
+            let (row, place) = (index / SIDE, index % SIDE);
+            let column = if row % 2 == 0 { place } else { SIDE - 1 - place };
+            let [xt_m, yt_m] = [column, row].map(|i| STEP_M * i as f64);
+            Shot { xt_m, yt_m, ..Shot::missed(&chirps, index, 0.0) }
+        };
+        let shots: Vec<Shot> = (0..SIDE * SIDE).map(shot).collect();
+        let waves = speckle_waves(seed);
+        let z = |(index, shot): (usize, &Shot)| {
+            let phase = std::f64::consts::TAU * index as f64 / 310.0;
+            let key = Key { seed, chirp: index as u64, sub_ray: 1, purpose: Purpose::Fit };
+            let own = 0.3 * key.draws().gaussian();
+            let of_waves =
+                waves.iter().map(|[kx, ky, phase]| (kx * shot.xt_m + ky * shot.yt_m + phase).cos());
+            let shared = of_waves.sum::<f64>() * (2.0 / waves.len() as f64).sqrt();
+            0.91f64.sqrt() * shared + own + swing_of * phase.sin()
+        };
+        let z: Vec<f64> = shots.iter().enumerate().map(z).collect();
+        let seen = Observation::detected(1e-9, None);
+        let shared = SharedSpeckle::of(&z, &vec![seen; z.len()], &shots, 0.016);
+        assert!(shared.is_any());
+        swing(&z, &shots, &shared, 2.3)
+    }
+
+    /// Wave numbers, 1/m, and phases whose sum shares exp(−2d²/w²), w = 13.6 mm: their spectrum is Gaussian, of the standard
+    /// deviation 2/w.
+    fn speckle_waves(seed: u64) -> Vec<[f64; 3]> {
+        let mut draws = Key { seed, chirp: 0, sub_ray: 2, purpose: Purpose::Fit }.draws();
+        let mut wave = || {
+            let [kx, ky] = [(); 2].map(|()| draws.gaussian() * 2.0 / 0.0136);
+            [kx, ky, std::f64::consts::TAU * draws.uniform()]
+        };
+        (0..500).map(|_| wave()).collect()
+    }
+
+    #[test]
+    fn shared_speckle_is_no_swing_and_hides_none() {
+        let alarms = (0..100).filter(|seed| found_in_shared(0.0, *seed).is_some()).count();
+        assert!(alarms <= 1, "{alarms}");
+        for seed in 0..5 {
+            let swing = found_in_shared(0.5, seed).unwrap();
+            let share = swing.strength_db / (2.3 * 0.5 / 2f64.sqrt());
+            assert!((0.5..1.4).contains(&share), "{seed}: {swing:?}");
+        }
     }
 
     #[test]

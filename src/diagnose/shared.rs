@@ -34,6 +34,8 @@ const AT_ONE_PLACE: f64 = 0.55;
 /// Widths of the correlation that are tried, in spots.
 const WIDTHS: std::ops::RangeInclusive<u32> = 2..=16;
 const WIDTH_STEP: f64 = 0.1;
+/// Distance, in widths, at which the kernel has fallen to 3·10⁻⁴.
+const KERNEL_REACH: f64 = 2.0;
 /// Share of a determinant below which it is rounding.
 const SINGULAR: f64 = 1e-12;
 /// Largest residual that counts, in standard deviations: a small bright place is not speckle.
@@ -48,11 +50,13 @@ pub(super) struct SharedSpeckle {
     cubes: f64,
     /// Distance up to which shots share speckle, m.
     pub reach_m: f64,
+    /// Width w of the kernel exp(−2d²/w²) by which places d apart share, m.
+    width_m: f64,
 }
 
 /// Shots that share nothing.
 pub(super) static ALONE: SharedSpeckle =
-    SharedSpeckle { weights: Vec::new(), cubes: 1.0, reach_m: 0.0 };
+    SharedSpeckle { weights: Vec::new(), cubes: 1.0, reach_m: 0.0, width_m: 0.0 };
 
 /// Shots in squares as wide as the farthest neighbours.
 struct Neighbours<'a> {
@@ -97,7 +101,7 @@ impl SharedSpeckle {
     ) -> SharedSpeckle {
         let lag_m = spot_m / PER_SPOT;
         let neighbours = Neighbours::new(shots, FARTHEST * spot_m);
-        let shares = correlations(&residuals(z, observations), &neighbours, lag_m);
+        let (shares, width) = correlations(&residuals(z, observations), &neighbours, lag_m);
         let reach = shares.len();
         if reach == 0 {
             return ALONE.clone();
@@ -113,7 +117,23 @@ impl SharedSpeckle {
             .collect();
         let all = |power: usize| sums.iter().map(|sums| sums[power]).sum::<f64>();
         let (cubes, weights) = (all(0) / all(1), sums.iter().map(|sums| 1.0 / sums[0]).collect());
-        SharedSpeckle { weights, cubes, reach_m: reach as f64 * lag_m }
+        SharedSpeckle { weights, cubes, reach_m: reach as f64 * lag_m, width_m: width * spot_m }
+    }
+
+    /// What shots share with those of so many chirps later, summed over all of a scan with so many `places` for chirps, as if it
+    /// began again at its end.
+    pub fn by_lag(&self, shots: &[Shot], places: usize) -> Vec<f64> {
+        let mut sums = vec![0.0; places];
+        let neighbours = Neighbours::new(shots, KERNEL_REACH * self.width_m);
+        for (index, shot) in shots.iter().enumerate() {
+            sums[0] += 1.0;
+            for (other, apart_m) in neighbours.of(index) {
+                let later = i64::from(shots[other].chirp) - i64::from(shot.chirp);
+                let share = (-2.0 * (apart_m / self.width_m).powi(2)).exp();
+                sums[later.rem_euclid(places as i64) as usize] += share;
+            }
+        }
+        sums
     }
 
     /// Whether shots share speckle.
@@ -153,8 +173,9 @@ fn residuals(z: &[f64], observations: &[Observation]) -> Vec<Option<f64>> {
     found.into_iter().map(|z| z.map(|z| z - mean)).collect()
 }
 
-/// Correlation of residuals at every lag, up to where none is left; empty where neighbours share nothing.
-fn correlations(z: &[Option<f64>], neighbours: &Neighbours, lag_m: f64) -> Vec<f64> {
+/// Correlation of residuals at every lag, up to where none is left, and the width of its kernel, in spots; empty where
+/// neighbours share nothing.
+fn correlations(z: &[Option<f64>], neighbours: &Neighbours, lag_m: f64) -> (Vec<f64>, f64) {
     let lags = (FARTHEST * PER_SPOT) as usize;
     let none = || (vec![0.0; lags], vec![0.0; lags]);
     let of_shot = |(mut sums, mut counts): (Vec<f64>, Vec<f64>), index: usize| {
@@ -193,27 +214,26 @@ fn correlations(z: &[Option<f64>], neighbours: &Neighbours, lag_m: f64) -> Vec<f
             Some([(lag as f64 + 0.5) / PER_SPOT, share(mean(lag, lag + 1)?), counts[lag]])
         })
         .collect();
-    if at_one_place(&measured) < AT_ONE_PLACE {
-        return Vec::new();
+    let [at_one_place, width] = kernel(&measured);
+    if at_one_place < AT_ONE_PLACE {
+        return (Vec::new(), 0.0);
     }
     // Within half a spot, or where a coarse scan has its nearest neighbours.
     let nearest = (1..=PER_SPOT as usize).find_map(|end| mean(0, end));
     let near = mean(0, (0.5 * PER_SPOT) as usize).or(nearest);
     if near.is_none_or(|near| share(near) < SHARED) {
-        return Vec::new();
+        return (Vec::new(), 0.0);
     }
     // A distance at which there are no neighbours ends nothing.
     let shares = (0..lags).map(|lag| mean(lag, lag + 1).map(share));
-    shares
-        .take_while(|share| share.is_none_or(|share| share >= LEAST))
-        .map(|s| s.unwrap_or(0.0))
-        .collect()
+    let shares = shares.take_while(|share| share.is_none_or(|share| share >= LEAST));
+    (shares.map(|share| share.unwrap_or(0.0)).collect(), width)
 }
 
-/// The correlation of places that lie ever closer, by a kernel a·exp(−2d²/w²) + b of the width that fits best. `measured`:
-/// distance in spots, correlation and number of pairs, from the nearest on.
-fn at_one_place(measured: &[[f64; 3]]) -> f64 {
-    let mut best = (f64::INFINITY, 0.0);
+/// The correlation a of places that lie ever closer and the width w, in spots, of the kernel a·exp(−2d²/w²) + b that fits
+/// best. `measured`: distance in spots, correlation and number of pairs, from the nearest on.
+fn kernel(measured: &[[f64; 3]]) -> [f64; 2] {
+    let mut best = (f64::INFINITY, [0.0; 2]);
     // A kernel narrower than the nearest neighbours are apart would tell nothing.
     let nearest = measured.first().map_or(0.0, |[apart, ..]| *apart);
     let widths = WIDTHS.map(|width| WIDTH_STEP * f64::from(width));
@@ -235,7 +255,7 @@ fn at_one_place(measured: &[[f64; 3]]) -> f64 {
         let b = (s - a * k) / n;
         let left = ss - a * ks - b * s;
         if left < best.0 {
-            best = (left, a);
+            best = (left, [a, width]);
         }
     }
     best.1
