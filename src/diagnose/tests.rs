@@ -626,6 +626,8 @@ fn a_false_alarm_at_the_target_says_what_its_kind_of_return_says() {
     // Several detections of a chirp: the nearest to the target is the echo, in whatever order they come.
     points.insert(0, point(21, -0.05, weak_w));
     points.extend([point(20, -0.5, weak_w), point(20, 0.5, weak_w)]);
+    // A numbered cloud has one point per chirp.
+    points.iter_mut().for_each(|point| point.chirp = None);
     let all = matched(&points, Returns::All);
     assert_eq!(limits(&all), [None; 2]);
     assert_eq!((count(&all), all.alarms.silent, all.strays.len()), ([5, 5], sent, 0));
