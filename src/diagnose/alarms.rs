@@ -71,17 +71,13 @@ pub struct FalseAlarms {
     pub expected: Option<f64>,
 }
 
-/// No chirps.
-pub(super) static NONE: Alarms = Alarms {
-    powers_w: Vec::new(),
-    near_target: 0.0,
-    of_target: 0,
-    silent: 0,
-    returns: Returns::Strongest,
-    looks: 1.0,
-    cells: None,
-    weight: 1.0,
-};
+impl FalseAlarms {
+    /// Those of two clouds.
+    pub(super) fn and(self, other: FalseAlarms) -> FalseAlarms {
+        let expected = self.expected.zip(other.expected).map(|(a, b)| a + b);
+        FalseAlarms { counted: self.counted + other.counted, expected }
+    }
+}
 
 impl Alarms {
     /// The same beside one of `every` chirps on the target.
@@ -352,6 +348,6 @@ mod tests {
         let silent = Alarms { cells: Some(1.0), ..unknown };
         let [low, high] = [1e-11, 4e-10].map(|noise_w| silent.ln_p(&receiver(noise_w), LIMITS));
         assert!(low > -1.0 && high < -30.0, "{low} {high}");
-        assert_eq!(NONE.ln_p(&receiver(1e-10), LIMITS), 0.0);
+        assert_eq!(Alarms::default().ln_p(&receiver(1e-10), LIMITS), 0.0);
     }
 }

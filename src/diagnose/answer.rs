@@ -1,11 +1,15 @@
 //! From the fitted models to the tables of the report.
 
+use std::ops::Range;
+
+use super::clouds::parts;
 use super::explanation::{Addition, Explanation};
 use super::folds::Folds;
-use super::report::{Base, BaseValue, BeforeAfter, FoundEffect, Parameters, Row, Value};
-use super::score::{AT_THE_FLOOR, DB, Errors};
+use super::report::{Base, BaseValue, BeforeAfter, CloudPart, FoundEffect, Parameters, Row, Value};
+use super::score::{AT_THE_FLOOR, DB, Errors, errors};
 use super::scorer::{Scorer, State};
 use super::subject::Subject;
+use super::views::Views;
 use crate::brdf::Brdf;
 use crate::effects::{Effect, Prediction, Shot};
 
@@ -20,6 +24,7 @@ pub(super) struct Column<'a> {
 /// One row per shot. `unknown`: change of ln mean of every shot by a smooth field, or nothing.
 pub(super) fn rows(
     subject: &Subject,
+    views: &Views,
     prediction: &Prediction,
     folds: &Folds,
     [before, after]: [Column; 2],
@@ -28,7 +33,9 @@ pub(super) fn rows(
     let mut rows = Vec::with_capacity(subject.shots.len());
     for (index, (shot, seen)) in subject.shots.iter().zip(subject.observations).enumerate() {
         let arrived = prediction.arrived.get(index).copied().flatten();
+        let there = views.in_first(shot);
         rows.push(Row {
+            scan: shot.scan,
             chirp: shot.chirp,
             observed_w: seen.power_w,
             before_w: before.state.held_out.shots[index].expected_w,
@@ -40,8 +47,8 @@ pub(super) fn rows(
             azimuth_rad: shot.azimuth_rad,
             range_m: shot.hit.range_m,
             range_residual_m: seen.range_m.zip(arrived).map(|(seen_m, a)| seen_m - a.range_m),
-            xt_m: shot.xt_m,
-            yt_m: shot.yt_m,
+            xt_m: there.xt_m,
+            yt_m: there.yt_m,
             edge_m: shot.edge_m,
             time_s: shot.time_s,
             region: shot.region,
@@ -54,7 +61,7 @@ pub(super) fn rows(
 /// The base model as fitted with the effects; `sd`: standard deviations of all unknowns.
 pub(super) fn base(subject: &Subject, state: &State, sd: &[f64]) -> Base {
     let Subject { receiver, declared, .. } = *subject;
-    let laws = state.space.model(receiver, &state.fit.at).laws;
+    let laws = state.space.model(receiver, &state.fit.at, 0).laws;
     let mut parameters = Vec::new();
     for (known, sd) in state.space.base_values(&state.fit.at).into_iter().zip(sd) {
         let units = laws.get(known.region).map_or(Vec::new(), Brdf::parameters);
@@ -62,11 +69,7 @@ pub(super) fn base(subject: &Subject, state: &State, sd: &[f64]) -> Base {
         let value = Value { value: known.value, sd: finite(sd * known.slope), unit };
         parameters.push(BaseValue { region: known.region, name: known.name, value });
     }
-    let level_db = state.space.level_index().map(|index| Value {
-        value: DB * state.fit.at[index],
-        sd: sd.get(index).and_then(|sd| finite(DB * sd)),
-        unit: "dB",
-    });
+    let level_db = level_db(state, sd, 0);
     Base {
         parameters,
         level_db,
@@ -110,6 +113,7 @@ fn found(
     FoundEffect {
         name: effect.name(),
         level: effect.level(),
+        scans: effect.scans().to_vec(),
         class: added.class.clone(),
         parameters: Parameters::new(effect, numbers, place, shots),
         place,
@@ -120,6 +124,35 @@ fn found(
 /// A standard deviation; none where the data do not determine the number.
 fn finite(sd: f64) -> Option<f64> {
     sd.is_finite().then_some(sd)
+}
+
+/// Level of the radar of a scan over its settings, dB; `sd`: standard deviations of all unknowns.
+fn level_db(state: &State, sd: &[f64], scan: usize) -> Option<Value> {
+    let index = state.space.level_index(scan)?;
+    let sd = sd.get(index).and_then(|sd| finite(DB * sd));
+    Some(Value { value: DB * state.fit.at[index], sd, unit: "dB" })
+}
+
+/// What each cloud has in a joint diagnosis, without its name; empty for one cloud. `sd`: standard deviations of all
+/// unknowns of the model with the effects.
+pub(super) fn clouds(scorer: &Scorer, base: &State, model: &State, sd: &[f64]) -> Vec<CloudPart> {
+    let parts = parts(scorer.problem.shots);
+    if parts.len() < 2 {
+        return Vec::new();
+    }
+    let part = |(scan, range): (u16, Range<usize>)| {
+        let folds = &scorer.folds.part(range.clone());
+        let seen = scorer.problem.observations[range.clone()].iter();
+        CloudPart {
+            name: format!("cloud {}", scan + 1),
+            chirps: range.len(),
+            detected: seen.filter(|seen| seen.power_w.is_some()).count(),
+            level_db: level_db(model, sd, usize::from(scan)),
+            before: errors(&base.held_out.shots[range.clone()], folds),
+            after: errors(&model.held_out.shots[range], folds),
+        }
+    };
+    parts.into_iter().map(part).collect()
 }
 
 /// Errors without and with the effects.

@@ -10,8 +10,9 @@
 
 use nalgebra::DVector;
 
+use super::clouds;
 use super::error::DiagnoseError;
-use super::evidence::{Candidate, Evidence, Largest};
+use super::evidence::{Candidate, CloudGain, Evidence, Largest};
 use super::exchange::{EVEN, SAME, exchange};
 use super::explanation::{Addition, Explanation};
 use super::field::Structure;
@@ -42,6 +43,8 @@ pub(super) struct Choice<'a> {
     pub structure: Structure,
     /// Effects that are supported but for their size beside the strongest.
     pub hidden: Vec<Candidate>,
+    /// The effect with the largest gain that several clouds together support and one of them excludes.
+    pub excluded: Option<Candidate>,
 }
 
 /// Adds effects until none is supported, and removes those that others made superfluous or that are
@@ -55,7 +58,7 @@ pub(super) fn choose_effects<'a>(
     effects: &[&'a dyn Effect],
 ) -> Result<Choice<'a>, DiagnoseError> {
     let scorer = &search.scorer;
-    let (mut ranking, mut hidden) = (Vec::new(), Vec::new());
+    let (mut ranking, mut hidden, mut excluded) = (Vec::new(), Vec::new(), None);
     let mut model = Explanation { state: base.clone(), added: Vec::new() };
     let (mut round, mut starts) = (0, 1);
     while model.added.len() < scorer.settings.most_effects {
@@ -65,6 +68,7 @@ pub(super) fn choose_effects<'a>(
             add_best(search, &mut model, &mut trials) || add_pair(search, &mut model, &mut trials);
         if !has_grown {
             hidden = hidden_by_the_strongest(search, &model, &mut trials);
+            excluded = excluded_by_a_cloud(search, &model, &mut trials);
         }
         // Of each family the member that was accepted, or the best.
         let mut candidates: Vec<Candidate> =
@@ -72,8 +76,9 @@ pub(super) fn choose_effects<'a>(
         candidates.sort_by_key(|candidate| !candidate.accepted);
         let mut names = Vec::new();
         candidates.retain(|candidate| {
-            let is_first = !names.contains(&candidate.name);
-            names.push(candidate.name);
+            let key = (candidate.name, candidate.scans.clone());
+            let is_first = !names.contains(&key);
+            names.push(key);
             is_first
         });
         candidates.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -109,11 +114,11 @@ pub(super) fn choose_effects<'a>(
         structure = scorer.structure(&model.state);
     }
     let space = &model.state.space;
-    model.added.iter_mut().for_each(|one| one.class.retain(|name| !space.has(name)));
-    ranking.iter_mut().for_each(|one| one.accepted &= space.has(one.name));
+    model.added.iter_mut().for_each(|one| one.class.retain(|name| !space.has(name, &[])));
+    ranking.iter_mut().for_each(|one| one.accepted &= space.has(one.name, &one.scans));
     // Without an effect nothing is hidden, and what was exchanged for another is not.
-    hidden.retain(|one| !space.effects.is_empty() && !space.has(one.name));
-    Ok(Choice { base, model, ranking, structure, hidden })
+    hidden.retain(|one| !space.effects.is_empty() && !space.has(one.name, &[]));
+    Ok(Choice { base, model, ranking, structure, hidden, excluded })
 }
 
 /// Effects that the data support by themselves, and that get no name because the strongest one is so much larger.
@@ -144,6 +149,21 @@ fn hidden_by_the_strongest<'a>(
     found
 }
 
+/// The effect with the largest gain that beats placebos and that one of several clouds excludes.
+fn excluded_by_a_cloud<'a>(
+    search: &Search,
+    model: &Explanation<'a>,
+    trials: &mut [Trial<'a>],
+) -> Option<Candidate> {
+    let judge = Judge::new(search.scorer, &model.state, model.largest());
+    for trial in trials.iter_mut().filter(|trial| trial.candidate.is_excluded()) {
+        if judge.beats_placebos(trial) {
+            return Some(trial.candidate.clone());
+        }
+    }
+    None
+}
+
 /// A trial that the data support.
 struct Contender {
     /// Its place among the trials.
@@ -151,6 +171,15 @@ struct Contender {
     held_out: HeldOut,
     /// The gain that counts.
     gain: f64,
+}
+
+/// A contender with everything refitted that its trial kept fixed.
+struct Settled<'a> {
+    trial: usize,
+    candidate: Candidate,
+    /// What speaks against it beside its likelihood, in ln p.
+    against: f64,
+    state: State<'a>,
 }
 
 /// Adds the best trial that is supported; false where there is none.
@@ -178,28 +207,27 @@ fn add_best<'a>(search: &Search, model: &mut Explanation<'a>, trials: &mut [Tria
     // Laws far from those stored may be as likely as near ones: each is judged by the nearer.
     let mut settled = Vec::new();
     for one in tied {
-        let Trial { space, fit, .. } = &trials[one.trial];
-        let (space, fit) = (space.clone(), fit.clone());
-        let state = scorer.settle(&model.state, space, fit, one.held_out.clone());
-        settled.push((one.trial, state.space.against(&state.fit.at), state));
+        let Trial { space, fit, candidate, .. } = &trials[one.trial];
+        let (space, fit, held_out) = (space.clone(), fit.clone(), one.held_out.clone());
+        let state = scorer.settle(&model.state, space, fit, held_out);
+        let against = state.space.against(&state.fit.at);
+        settled.push(Settled { trial: one.trial, candidate: candidate.clone(), against, state });
     }
-    let least = settled.iter().map(|one| one.1).fold(f64::INFINITY, f64::min);
-    let best = settled.iter().find(|one| one.1 < least + EVEN).map_or(first.trial, |one| one.0);
+    let least = settled.iter().map(|one| one.against).fold(f64::INFINITY, f64::min);
+    let Some(best) = settled.iter().find(|one| one.against < least + EVEN) else { return false };
     // Of its family the simplest member.
-    let name = trials[best].candidate.name;
-    let numbers = |trial: usize| trials[trial].candidate.numbers;
-    let family = settled.iter().map(|one| one.0);
-    let family = family.filter(|trial| trials[*trial].candidate.name == name);
-    let best = family.min_by_key(|trial| numbers(*trial)).unwrap_or(best);
+    let chosen = best.candidate.clone();
+    let family = settled.iter().filter(|one| one.candidate.is_same(&chosen));
+    let best = family.min_by_key(|one| one.candidate.numbers).map_or(best.trial, |one| one.trial);
     let mut class: Vec<&'static str> = Vec::new();
-    for other in settled.iter().map(|one| trials[one.0].candidate.name) {
-        if other != name && !class.contains(&other) {
+    for other in settled.iter().map(|one| one.candidate.name) {
+        if other != chosen.name && !class.contains(&other) {
             class.push(other);
         }
     }
     let rivals = contenders
         .iter()
-        .filter(|one| trials[one.trial].candidate.name != name)
+        .filter(|one| !trials[one.trial].candidate.is_same(&chosen))
         .filter(|one| one.gain >= SHARE_OF_RIVAL * first.gain)
         .take(MOST_RIVALS)
         .map(|one| trials[one.trial].effect)
@@ -207,10 +235,9 @@ fn add_best<'a>(search: &Search, model: &mut Explanation<'a>, trials: &mut [Tria
     let candidate = &mut trials[best].candidate;
     candidate.accepted = true;
     model.added.push(Addition { class, evidence: Evidence::from(&*candidate), rivals });
-    model.state = settled
-        .into_iter()
-        .find(|one| one.0 == best)
-        .map_or_else(|| model.state.clone(), |one| one.2);
+    settled.retain(|one| one.trial == best);
+    let Some(added) = settled.pop() else { return false };
+    model.state = added.state;
     true
 }
 
@@ -254,15 +281,21 @@ fn add_pair<'a>(search: &Search, model: &mut Explanation<'a>, trials: &mut [Tria
     }
     // Each has the evidence of both: alone it has none.
     let [held_out_gain, held_out_se] = scorer.difference(&next.held_out, &model.state.held_out);
+    let by_cloud = clouds::gains(scorer, &next.held_out, &model.state.held_out);
+    if by_cloud.iter().any(CloudGain::contradicts) {
+        return false;
+    }
     for trial in pair {
         let size_db = trial.candidate.size_db;
-        let evidence = Evidence { gain, placebo_gain, held_out_gain, held_out_se, size_db };
+        let by_cloud = by_cloud.clone();
+        let evidence =
+            Evidence { gain, placebo_gain, held_out_gain, held_out_se, size_db, by_cloud };
         model.added.push(Addition { class: Vec::new(), evidence, rivals: Vec::new() });
     }
     model.state = next;
-    let names = pair.map(|trial| trial.candidate.name);
-    for trial in trials.iter_mut().filter(|trial| names.contains(&trial.candidate.name)) {
-        trial.candidate.accepted = true;
+    let pair = pair.map(|trial| trial.candidate.clone());
+    for trial in trials.iter_mut() {
+        trial.candidate.accepted |= pair.iter().any(|one| one.is_same(&trial.candidate));
     }
     true
 }
@@ -285,7 +318,7 @@ fn best_pair<'t, 'a>(
     beaten.truncate(MOST_PAIRED);
     let mut pairs = Vec::new();
     for (index, &a) in beaten.iter().enumerate() {
-        for &b in beaten[index + 1..].iter().filter(|b| b.candidate.name != a.candidate.name) {
+        for &b in beaten[index + 1..].iter().filter(|b| !b.candidate.is_same(&a.candidate)) {
             let space = a.space.with(b.effect);
             let start = a.fit.at.iter().chain(b.fit.at.iter().skip(state.fit.at.len()));
             let start = DVector::from_vec(start.copied().collect());

@@ -51,6 +51,7 @@ pub(super) fn covariates(
             cells: 8,
         },
         Covariate::of_shots("region", 8, shots, |shot| f64::from(shot.region)),
+        Covariate::of_shots("cloud", 8, shots, |shot| f64::from(shot.scan)),
     ];
     all.retain(|c| c.values.iter().any(|value| Some(value) != c.values.first()));
     all

@@ -94,6 +94,30 @@ pub enum DiagnoseError {
         /// Rms residual of a correct model, dB.
         noise_floor_db: f64,
     },
+    /// The scenes of several clouds have other meshes.
+    #[error(
+        "the mesh of cloud {cloud} is not that of the first, moved as a whole: only clouds of one rigid target are \
+         diagnosed together; use the same meshes in the same order, or diagnose this cloud alone"
+    )]
+    OtherTarget {
+        /// Number of the cloud, from 1.
+        cloud: usize,
+    },
+    /// The scenes of several clouds have other receivers.
+    #[error(
+        "cloud {cloud} has other values of [radar.noise], [radar.speckle], `threshold_dbm` or an effect on them than the \
+         first: only clouds whose receivers are alike are diagnosed together; diagnose this cloud alone"
+    )]
+    OtherReceiver {
+        /// Number of the cloud, from 1.
+        cloud: usize,
+    },
+    /// Several clouds contradict each other.
+    #[error("{sentence}")]
+    Contradiction {
+        /// Which does, in what, and the way out.
+        sentence: String,
+    },
     /// Effects over time, and a scan without times.
     #[error(
         "the scan of the scene has no times, and {effects} cannot be identified without them; give its chirps a \

@@ -1,6 +1,34 @@
 //! The evidence for an effect.
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
+
+use crate::effects::Effect;
+
+/// Standard errors by which an effect may make the predictions of one cloud worse by chance.
+const BY_CHANCE: f64 = 2.0;
+
+/// Gain in ln p of the held-out patches of one cloud by an effect of a joint diagnosis.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct CloudGain {
+    /// Number of the cloud, from 1.
+    pub cloud: usize,
+    /// Gain in ln p.
+    pub gain: f64,
+    /// Its standard error.
+    pub se: f64,
+}
+
+impl CloudGain {
+    /// Whether the effect makes the predictions of the cloud worse beyond chance.
+    pub(super) fn contradicts(&self) -> bool {
+        self.gain < -BY_CHANCE * self.se
+    }
+}
+
+/// Numbers of scans as a file has them: from 1.
+pub(super) fn from_one<S: Serializer>(scans: &[u16], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(scans.iter().map(|scan| scan + 1))
+}
 
 /// An effect in one round of the search.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -9,6 +37,9 @@ pub struct Candidate {
     pub round: usize,
     /// Name of the effect.
     pub name: &'static str,
+    /// Scans on which it acts, of several that are diagnosed together; empty for all.
+    #[serde(rename = "clouds", serialize_with = "from_one", skip_serializing_if = "Vec::is_empty")]
+    pub scans: Vec<u16>,
     /// Number of its parameters.
     pub numbers: usize,
     /// Gain in ln likelihood over the model so far.
@@ -25,19 +56,19 @@ pub struct Candidate {
     pub converged: bool,
     /// Whether the effect was added in this round and stayed.
     pub accepted: bool,
+    /// Gain in each of several clouds; empty for one cloud, and for an effect that is not supported.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub by_cloud: Vec<CloudGain>,
 }
 
 impl Candidate {
     /// A candidate of which only the gain on a sample is known.
-    pub(super) fn sampled(
-        round: usize,
-        name: &'static str,
-        numbers: usize,
-        gain: f64,
-    ) -> Candidate {
+    pub(super) fn sampled(round: usize, effect: &dyn Effect, gain: f64) -> Candidate {
+        let numbers = effect.parameters().len();
         Candidate {
             round,
-            name,
+            name: effect.name(),
+            scans: effect.scans().to_vec(),
             numbers,
             gain,
             sampled: true,
@@ -46,7 +77,18 @@ impl Candidate {
             size_db: 0.0,
             converged: false,
             accepted: false,
+            by_cloud: Vec::new(),
         }
+    }
+
+    /// Whether another one is of the same effect on the same scans.
+    pub(super) fn is_same(&self, other: &Candidate) -> bool {
+        self.name == other.name && self.scans == other.scans
+    }
+
+    /// Whether one of several clouds excludes it.
+    pub(super) fn is_excluded(&self) -> bool {
+        self.by_cloud.iter().any(CloudGain::contradicts)
     }
 }
 
@@ -63,6 +105,9 @@ pub struct Evidence {
     pub held_out_se: f64,
     /// Change of the data: root mean square of mean powers, or of the spread, dB.
     pub size_db: f64,
+    /// Gain in ln p of the held-out patches of each of several clouds; empty for one cloud.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub by_cloud: Vec<CloudGain>,
 }
 
 impl From<&Candidate> for Evidence {
@@ -74,6 +119,7 @@ impl From<&Candidate> for Evidence {
             held_out_gain,
             held_out_se,
             size_db: candidate.size_db,
+            by_cloud: candidate.by_cloud.clone(),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Effects against rivals that did nearly as well when they were chosen: effects added later may have made the
 //! difference clear.
 
+use super::clouds;
 use super::evidence::{Evidence, Largest};
 use super::explanation::{Addition, Explanation};
 use super::scorer::State;
@@ -24,7 +25,7 @@ pub(super) fn exchange<'a>(search: &Search, model: &mut Explanation<'a>) {
         let mut one = model.added.remove(0);
         (model.state.space, model.state.fit.at) = model.state.space.rotated(&model.state.fit.at);
         let mut rivals = std::mem::take(&mut one.rivals);
-        rivals.retain(|rival| !model.state.space.has(rival.name()));
+        rivals.retain(|rival| !model.state.space.has(rival.name(), rival.scans()));
         if !rivals.is_empty() {
             let without = search.scorer.without(&model.state, model.added.len());
             let largest = model.largest();
@@ -54,6 +55,7 @@ fn contest<'a>(
     let Trial { space, fit, mut candidate, .. } = trial;
     let with_rival = scorer.settle(without, space, fit, held_out);
     candidate.held_out = Some(scorer.difference(&with_rival.held_out, &without.held_out));
+    candidate.by_cloud = clouds::gains(scorer, &with_rival.held_out, &without.held_out);
     // Of effects that predict equally well the one with fewer parameters in use and nearer laws is better.
     let [better, se] = scorer.difference(&with_rival.held_out, &state.held_out);
     let is_tied = better.abs() <= se.max(SAME);

@@ -77,6 +77,13 @@ impl Folds {
         self.fold.get(shot) == Some(&fold)
     }
 
+    /// The patches of some of the shots.
+    pub(super) fn part(&self, shots: std::ops::Range<usize>) -> Folds {
+        let [block, fold, cell] =
+            [&self.block, &self.fold, &self.cell].map(|of| of[shots.clone()].to_vec());
+        Folds { block, fold, cell, ..*self }
+    }
+
     /// Sum of one number per shot, and its standard error over cells. The cells are smaller
     /// than the patches of the folds: a local effect would lie in one patch and have no standard error.
     pub fn sum(&self, values: &[f64]) -> [f64; 2] {

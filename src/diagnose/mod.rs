@@ -13,6 +13,7 @@
 //! | from a scene and its cloud to a report | `scan.rs`, `run.rs` |
 //! | every chirp against the target, the cloud against the chirps | `shots.rs`, `matching.rs` |
 //! | probability of the observations | `likelihood.rs`, `problem.rs`, `shared.rs` |
+//! | several clouds of one target | `views.rs`, `in_scans.rs`, `clouds.rs`, `contradiction.rs` |
 //! | scattering models and effects together | `space.rs`, `refit.rs`, `ranges.rs` |
 //! | the promise of an effect | `screen.rs` |
 //! | the score of a model on held-out patches | `folds.rs`, `score.rs`, `scorer.rs` |
@@ -25,6 +26,8 @@
 mod alarms;
 mod answer;
 mod choose;
+mod clouds;
+mod contradiction;
 mod controls;
 mod covariates;
 pub mod curve;
@@ -34,6 +37,7 @@ mod exchange;
 mod explanation;
 mod field;
 mod folds;
+mod in_scans;
 mod level;
 mod likelihood;
 mod matching;
@@ -63,19 +67,20 @@ mod support;
 #[cfg(test)]
 mod tests;
 mod trial;
+mod views;
 
 pub use alarms::{Alarms, FalseAlarms};
 pub use error::DiagnoseError;
-pub use evidence::{Candidate, Evidence};
+pub use evidence::{Candidate, CloudGain, Evidence};
 pub use folds::Folds;
 pub use matching::{CloudMatch, Stray, match_cloud};
 pub use observation::{Observation, ReceiverLimits};
 pub use report::{
-    Base, BaseValue, BeforeAfter, Control, Controls, FoundEffect, MeshPose, Parameters, Power,
-    Report, Row, SCHEMA, Triple, Value, Verdict,
+    Base, BaseValue, BeforeAfter, CloudPart, Contradiction, Control, Controls, FoundEffect,
+    MeshPose, Parameters, Power, Report, Row, SCHEMA, Triple, Value, Verdict,
 };
 pub use residual::{MAY_BE, ResidualStructure};
-pub use scan::{MeasuredScene, declared_receiver};
+pub use scan::{MeasuredScene, declared_receiver, diagnose_together};
 pub use score::Errors;
 pub use settings::Diagnosis;
 pub use shots::trace_shots;

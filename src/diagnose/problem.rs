@@ -9,7 +9,10 @@ use super::likelihood::{Likelihood, Term};
 use super::observation::{DB, Observation, ReceiverLimits};
 use super::shared::SharedSpeckle;
 use super::space::Space;
-use crate::effects::{Ceiling, Model, Prediction, PredictionCache, Receiver, Shot, Stage, Twist};
+use super::views::Views;
+use crate::effects::{
+    Ceiling, Effect, Model, Prediction, PredictionCache, Receiver, Shot, Stage, Twist,
+};
 use crate::fit::minimise::Local;
 
 /// Shift, m, and turn, deg, of the target in a difference quotient, per step of an effect's parameter.
@@ -22,20 +25,57 @@ pub(super) const ENOUGH: usize = 2500;
 /// The data of a diagnosis.
 #[derive(Clone, Copy)]
 pub(super) struct Problem<'a> {
-    pub stage: &'a Stage<'a>,
+    /// The scans: one, or several of one target.
+    pub views: &'a Views<'a>,
+    /// The shots, scan after scan.
     pub shots: &'a [Shot],
     pub observations: &'a [Observation],
     pub declared: ReceiverLimits,
     pub receiver: Receiver,
-    /// What the chirps report that see no target.
-    pub alarms: &'a Alarms,
+    /// What the chirps of each scan report that see no target.
+    pub alarms: &'a [Alarms],
     /// How much of its speckle each shot has to itself.
     pub shared: &'a SharedSpeckle,
-    /// Rays already traced for these shots.
-    pub traced: &'a PredictionCache,
+    /// Rays already traced for these shots, by their scan.
+    pub traced: &'a [PredictionCache],
 }
 
-impl Problem<'_> {
+/// Caches for the shots of some scans.
+pub(super) fn caches(scans: usize) -> Vec<PredictionCache> {
+    (0..scans).map(|_| PredictionCache::default()).collect()
+}
+
+impl<'a> Problem<'a> {
+    /// The stage of a shot.
+    pub fn stage(&self, shot: &Shot) -> &'a Stage<'a> {
+        self.views.stage(shot)
+    }
+
+    /// Where the searches for an effect start.
+    pub fn starts(&self, effect: &dyn Effect) -> Vec<Vec<f64>> {
+        effect.starts(&self.views.stages[0], self.shots)
+    }
+
+    /// What the models of the scans predict, scan after scan. They have one receiver.
+    fn predict_by<'m>(&self, model: impl Fn(u16) -> Model<'m>) -> Prediction {
+        let mut all: Option<Prediction> = None;
+        for shots in self.shots.chunk_by(|a, b| a.scan == b.scan) {
+            let scan = shots[0].scan;
+            let traced = &self.traced[usize::from(scan)];
+            let part = model(scan).predict_with(self.stage(&shots[0]), shots, traced);
+            match &mut all {
+                None => all = Some(part),
+                Some(all) => {
+                    all.arrived.extend(part.arrived);
+                    all.tilts.extend(part.tilts);
+                }
+            }
+        }
+        all.unwrap_or_else(|| {
+            model(0).predict_with(&self.views.stages[0], self.shots, &PredictionCache::default())
+        })
+    }
+
     /// Effective number of independent shots.
     pub fn independent_shots(&self) -> f64 {
         self.shared.count(self.shots.len())
@@ -43,12 +83,12 @@ impl Problem<'_> {
 
     /// The prediction of a point.
     pub fn predict(&self, space: &Space, at: &DVector<f64>) -> Prediction {
-        space.model(self.receiver, at).predict_with(self.stage, self.shots, self.traced)
+        self.predict_by(|scan| space.model(self.receiver, at, scan))
     }
 
     /// The part of every chirp in the likelihood of a point.
     pub fn terms(&self, space: &Space, at: &DVector<f64>) -> Vec<Term> {
-        self.terms_of(&space.model(self.receiver, at))
+        self.terms_of(&self.predict(space, at))
     }
 
     /// ln likelihood of a point, less what the scale of the laws takes ([`Space::prior`]).
@@ -63,7 +103,8 @@ impl Problem<'_> {
 
     /// ln likelihood of the chirps that see no target.
     pub fn ln_p_of_alarms(&self, space: &Space, at: &DVector<f64>) -> f64 {
-        self.alarms.ln_p(&space.received(self.receiver, at), self.declared)
+        let receiver = space.received(self.receiver, at);
+        self.alarms.iter().map(|alarms| alarms.ln_p(&receiver, self.declared)).sum()
     }
 
     /// −[`Problem::beside`] near a point. Only effects on the receiver change false alarms, by their own unknowns.
@@ -93,10 +134,30 @@ impl Problem<'_> {
         local
     }
 
-    /// ln of the level at which most detections are as strong as the stored laws have them.
-    pub fn ln_level(&self, space: &Space) -> f64 {
+    /// The space with the level of every radar that is not calibrated.
+    pub fn with_levels<'s>(&self, mut space: Space<'s>) -> Space<'s> {
+        let (instruments, mut levels) = (self.views.instruments(), Vec::new());
+        let mut level_of_scan: Vec<Option<usize>> = Vec::new();
+        for (scan, &first) in instruments.iter().enumerate() {
+            let level = if first < scan {
+                level_of_scan[first]
+            } else if self.views.stages[scan].geometry.radar.calibrated {
+                None
+            } else {
+                levels.push(self.ln_level(&space, |other| instruments[other] == first));
+                Some(levels.len() - 1)
+            };
+            level_of_scan.push(level);
+        }
+        (space.ln_levels, space.level_of_scan) = (levels, level_of_scan);
+        space
+    }
+
+    /// ln of the level at which most detections of some scans are as strong as the stored laws have them.
+    fn ln_level(&self, space: &Space, is_of_it: impl Fn(usize) -> bool) -> f64 {
         let prediction = self.predict(space, &space.start());
         let mut off: Vec<f64> = (0..self.shots.len())
+            .filter(|&shot| is_of_it(usize::from(self.shots[shot].scan)))
             .filter_map(|shot| Some((self.observations[shot].power_w?, prediction.mean_w(shot))))
             .filter(|(_, mean_w)| *mean_w > 0.0)
             .map(|(power_w, mean_w)| (power_w / mean_w).ln())
@@ -109,9 +170,8 @@ impl Problem<'_> {
         median.clamp(-MOST_OFF_DB / DB, MOST_OFF_DB / DB)
     }
 
-    fn terms_of(&self, model: &Model) -> Vec<Term> {
-        let prediction = model.predict_with(self.stage, self.shots, self.traced);
-        Likelihood::new(&prediction, self.declared, self.shared).terms(self.observations)
+    fn terms_of(&self, prediction: &Prediction) -> Vec<Term> {
+        Likelihood::new(prediction, self.declared, self.shared).terms(self.observations)
     }
 
     /// Slopes of every shot by every unknown: forward differences for scattering models, which are
@@ -143,7 +203,7 @@ impl Problem<'_> {
         // Unknowns that move the target share the slopes by small shifts and turns of it.
         let moving: Vec<usize> = space.moving();
         let twists = if moving.iter().any(|&index| is_free(index)) {
-            space.twists(at, self.stage, self.shots)
+            space.twists(at, self.views, self.shots)
         } else {
             Vec::new()
         };
@@ -190,7 +250,8 @@ impl Problem<'_> {
             let [more, less] = [step, -step].map(|by| {
                 let mut twist = Twist::default();
                 twist[axis] = by;
-                self.terms_of(&space.model(self.receiver, at).twisted(twist))
+                let model = |scan| space.model(self.receiver, at, scan).twisted(twist);
+                self.terms_of(&self.predict_by(model))
             });
             quotients(&more, &less, 2.0 * step)
         });
@@ -203,8 +264,9 @@ impl Problem<'_> {
     pub fn mean_slopes(&self, space: &Space, at: &DVector<f64>) -> Vec<Vec<f64>> {
         let [lower, upper] = space.bounds();
         let mut all = Vec::new();
-        // The scale of the laws stands for the level, too.
-        let others = space.level_index().filter(|level| *level > 0);
+        // The scale of the laws stands for the level of one radar, too.
+        let is_free = space.level_of_scan.iter().all(Option::is_some);
+        let others = space.level_index(0).filter(|level| *level > 0 && is_free);
         for index in (0..at.len()).filter(|index| Some(*index) != others) {
             let difference = space.difference(at, [&lower, &upper], index, EFFECT_STEP, false);
             let [more, less] = difference.ends.map(|end| self.ln_means(space, &end));
@@ -285,9 +347,9 @@ pub(super) fn ln_likelihood(terms: &[Term]) -> f64 {
 pub(super) struct Sample {
     shots: Vec<Shot>,
     observations: Vec<Observation>,
-    alarms: Alarms,
+    alarms: Vec<Alarms>,
     shared: SharedSpeckle,
-    traced: PredictionCache,
+    traced: Vec<PredictionCache>,
     /// Shots of the scan per shot of the sample.
     pub weight: f64,
 }
@@ -299,8 +361,8 @@ impl Sample {
         let shots: Vec<Shot> = problem.shots.iter().step_by(every).copied().collect();
         let observations = problem.observations.iter().step_by(every).copied().collect();
         let weight = problem.shots.len() as f64 / shots.len().max(1) as f64;
-        let (shared, traced) = (problem.shared.step_by(every), PredictionCache::default());
-        let alarms = problem.alarms.beside_sample(every);
+        let (shared, traced) = (problem.shared.step_by(every), caches(problem.traced.len()));
+        let alarms = problem.alarms.iter().map(|alarms| alarms.beside_sample(every)).collect();
         Sample { shots, observations, alarms, shared, traced, weight }
     }
 

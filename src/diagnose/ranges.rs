@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::observation::Observation;
 use super::problem::Problem;
 use super::space::Space;
-use crate::effects::{Effect, Shot, Twist, way_m};
+use crate::effects::{Effect, Model, Shot, Twist, way_m};
 use crate::measure::icp::bulk_sd_m;
 
 /// Most rounds of tracing.
@@ -82,14 +82,18 @@ fn step(
 
 /// Every range that the target at a point has a prediction for.
 fn rows(problem: &Problem, space: &Space, effect: &dyn Effect, at: &DVector<f64>) -> Vec<Row> {
-    let model = space.model(problem.receiver, at);
+    let scans = problem.views.stages.len();
+    let models: Vec<Model> =
+        (0..scans).map(|scan| space.model(problem.receiver, at, scan as u16)).collect();
     let values = space.effect_values(at).pop().unwrap_or_default();
     let pairs = problem.shots.par_iter().zip(problem.observations);
     pairs
         .filter_map(|(shot, seen): (&Shot, &Observation)| {
             let range_m = seen.range_m.filter(|_| problem.declared.range_sd_m > 0.0)?;
-            let placed = model.placed(problem.stage, *shot)?;
-            let twists = effect.twists(&values, problem.stage, &placed);
+            let acts = effect.scans().is_empty() || effect.scans().contains(&shot.scan);
+            let model = models.get(usize::from(shot.scan)).filter(|_| acts)?;
+            let placed = model.placed(problem.stage(shot), *shot)?;
+            let twists = effect.twists(&values, problem.stage(shot), &placed);
             let steps = effect.parameters().iter().map(|known| known.step);
             let slopes_m = twists.iter().zip(steps);
             let slopes_m = slopes_m.map(|(twist, step)| step * slope_m(problem, twist, &placed));
@@ -101,6 +105,6 @@ fn rows(problem: &Problem, space: &Space, effect: &dyn Effect, at: &DVector<f64>
 /// Change of the range of a shot by a small motion of the target, m: the way of its surface point, projected on the normal
 /// and seen along the ray.
 fn slope_m(problem: &Problem, twist: &Twist, shot: &Shot) -> f64 {
-    let way_m = way_m(twist, problem.stage.middle, shot.hit.point.xyz);
+    let way_m = way_m(twist, problem.stage(shot).middle, shot.hit.point.xyz);
     -way_m.dot(shot.normal) / shot.hit.cos_theta.max(0.05)
 }

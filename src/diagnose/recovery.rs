@@ -4,10 +4,9 @@
 
 use nalgebra::DVector;
 
-use super::alarms::NONE;
 use super::folds::Folds;
 use super::observation::{Observation, ReceiverLimits};
-use super::problem::Problem;
+use super::problem::{Problem, caches};
 use super::refit::SCOUT;
 use super::report::Power;
 use super::scorer::{Scorer, State};
@@ -16,7 +15,7 @@ use super::settings::Diagnosis;
 use super::size::Size;
 use super::space::Space;
 use super::trial::Search;
-use crate::effects::{Effect, Prediction, PredictionCache};
+use crate::effects::{Effect, Prediction};
 use crate::radar::random::{Key, Purpose};
 
 /// Starts of an effect that are considered.
@@ -34,12 +33,12 @@ const FAR_STEPS: f64 = 30.0;
 /// The size from which on an effect is found in simulated data.
 pub(super) fn recover(search: &Search, base: &State, effect: &dyn Effect) -> Power {
     // Rays traced for one effect are of no use to another.
-    let traced = &PredictionCache::default();
+    let traced = &caches(search.scorer.problem.traced.len());
     let problem = Problem { traced, ..search.sample.problem(&search.scorer.problem) };
     let settings = search.scorer.settings;
     let Diagnosis { block_m, folds, seed, .. } = *settings;
     let make = if problem.shared.is_any() { Folds::of_shared } else { Folds::new };
-    let folds = &make(problem.shots, block_m, folds, seed);
+    let folds = &make(&problem.views.all_in_first(problem.shots), block_m, folds, seed);
     let scorer = Scorer { problem, folds, settings };
     Bench { scorer, weight: search.sample.weight, base, effect }.power()
 }
@@ -72,7 +71,7 @@ impl Bench<'_> {
     fn power(&self) -> Power {
         let problem = &self.scorer.problem;
         let rungs = self.rungs();
-        let tried = self.effect.starts(problem.stage, problem.shots).len();
+        let tried = problem.starts(self.effect).len();
         // An effect that is found is also found when stronger.
         let (mut missed, mut found): (Vec<f64>, Option<f64>) = (Vec::new(), None);
         let mut open: &[Rung] = &rungs;
@@ -89,7 +88,12 @@ impl Bench<'_> {
         // Remaining sizes need not be in the order of those injected.
         missed.retain(|db| found.is_none_or(|found| *db < found));
         let missed_db = missed.into_iter().max_by(f64::total_cmp);
-        Power { name: self.effect.name(), least_db: found, missed_db }
+        Power {
+            name: self.effect.name(),
+            scans: self.effect.scans().to_vec(),
+            least_db: found,
+            missed_db,
+        }
     }
 
     /// The effect in strengths about the one that a score test just detects, weakest first.
@@ -115,7 +119,7 @@ impl Bench<'_> {
     fn points(&self, with: &Space) -> Vec<DVector<f64>> {
         let Scorer { problem, .. } = self.scorer;
         let effect = self.effect;
-        let starts = effect.starts(problem.stage, problem.shots);
+        let starts = problem.starts(effect);
         let every = starts.len().div_ceil(MOST_STARTS).max(1);
         let starts: Vec<Vec<f64>> = starts.into_iter().step_by(every).collect();
         if starts.iter().any(|start| is_far(effect, start)) {
@@ -164,7 +168,7 @@ impl Bench<'_> {
         let truth = self.scorer.problem.predict(&with, at);
         let observations = &self.simulate(&truth);
         // Chirps beside the target are not simulated.
-        let problem = Problem { observations, alarms: &NONE, ..self.scorer.problem };
+        let problem = Problem { observations, alarms: &[], ..self.scorer.problem };
         let before = problem.fit(bare, &fit.at, &[], &SCOUT);
         let after = problem.fit(&with, at, &[], &SCOUT);
         // The scan has more shots than the sample.

@@ -40,7 +40,9 @@ pub(super) fn find_unexplained(scorer: &Scorer, remainder: &Remainder) -> Vec<Re
     if scorer.is_shared(&neighbours, largest_db) {
         found.push(neighbours);
     }
-    if let Some([strength_db, gain]) = alarms.unlike(&prediction.receiver, declared) {
+    for [strength_db, gain] in
+        alarms.iter().filter_map(|alarms| alarms.unlike(&prediction.receiver, declared))
+    {
         let p_value = (-gain).exp();
         let covariate = "false alarms".to_owned();
         found.push(ResidualStructure { covariate, strength_db, p_value });

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::alarms::FalseAlarms;
-use super::evidence::{Candidate, Evidence};
+use super::evidence::{Candidate, Evidence, from_one};
 use super::residual::ResidualStructure;
 use super::score::Errors;
 use crate::brdf::Brdf;
@@ -24,6 +24,8 @@ pub enum Verdict {
     Explained,
     /// Structure remains that no effect explains.
     Unexplained,
+    /// Several clouds contradict each other: no one model is right for all of them.
+    Contradictory,
 }
 
 impl Verdict {
@@ -116,6 +118,9 @@ pub struct FoundEffect {
     pub name: &'static str,
     /// The level it belongs to.
     pub level: Level,
+    /// Scans on which it acts, of several that are diagnosed together; empty for all.
+    #[serde(rename = "clouds", serialize_with = "from_one", skip_serializing_if = "Vec::is_empty")]
+    pub scans: Vec<u16>,
     /// Effects that predict the data as well.
     pub class: Vec<&'static str>,
     /// Its parameters by name, fitted together with everything else.
@@ -198,6 +203,9 @@ pub struct Base {
 pub struct Power {
     /// Effect.
     pub name: &'static str,
+    /// Scans on which it acts, of several that are diagnosed together; empty for all.
+    #[serde(rename = "clouds", serialize_with = "from_one", skip_serializing_if = "Vec::is_empty")]
+    pub scans: Vec<u16>,
     /// The smallest size that was found, dB remaining after a refit of the scattering models; none where none was.
     pub least_db: Option<f64>,
     /// The largest size below it that was not found, dB; none where all were found.
@@ -234,6 +242,8 @@ pub struct Control {
 /// One shot in the table of residuals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
+    /// Number of its cloud, from 0.
+    pub scan: u16,
     /// Chirp number.
     pub chirp: u32,
     /// Received power, W; none where nothing was detected.
@@ -257,9 +267,9 @@ pub struct Row {
     pub range_m: f64,
     /// Measured less predicted range with the effects, m; none where there is no range.
     pub range_residual_m: Option<f64>,
-    /// x in the target plane, m.
+    /// x in the target plane, m; of several clouds in that of the first, where its antenna sees the same point of the target.
     pub xt_m: f64,
-    /// y in the target plane, m.
+    /// y in the target plane, m, as `xt_m`.
     pub yt_m: f64,
     /// Distance to the nearest edge in depth, m, at most three spots.
     pub edge_m: f64,
@@ -270,6 +280,38 @@ pub struct Row {
     /// Change of the mean power of the final model, dB, by a smooth field over all covariates that was fitted without
     /// this shot's fold; 0 where such a field finds nothing.
     pub unknown_db: f64,
+}
+
+/// What one of several clouds has in a joint diagnosis.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CloudPart {
+    /// Its name.
+    pub name: String,
+    /// Its chirps that meet the target.
+    pub chirps: usize,
+    /// Those of them that were detected.
+    pub detected: usize,
+    /// Level of its radar over the one that its settings state, dB; none for a radar that was calibrated.
+    pub level_db: Option<Value>,
+    /// Errors on its held-out patches, by the base model.
+    pub before: Errors,
+    /// Errors on its held-out patches, with the effects.
+    pub after: Errors,
+}
+
+/// A cloud that contradicts the others.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Contradiction {
+    /// Number of the cloud, from 1.
+    pub cloud: usize,
+    /// The effect that the clouds together support and this one excludes; none where it needs other laws than the rest.
+    pub effect: Option<&'static str>,
+    /// Change of ln p of its held-out patches by that effect, or by laws of its own.
+    pub gain: f64,
+    /// Its standard error.
+    pub se: f64,
+    /// Change of its mean powers, or of the data, root mean square, dB.
+    pub size_db: f64,
 }
 
 /// The report.
@@ -298,6 +340,12 @@ pub struct Report {
     pub independent_chirps: f64,
     /// Controls of the answer.
     pub controls: Controls,
+    /// What each of several clouds has; empty for one cloud.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub clouds: Vec<CloudPart>,
+    /// Why several clouds contradict each other.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub contradictions: Vec<Contradiction>,
     /// The model that the effects are added to.
     #[serde(skip)]
     pub base: Base,
@@ -315,13 +363,16 @@ impl Report {
     pub fn not_found(&self) -> impl Iterator<Item = &Candidate> {
         self.ranking.iter().enumerate().filter_map(|(place, tried)| {
             let mut later = self.ranking.iter().skip(place + 1);
-            let is_last = !later.any(|later| later.name == tried.name);
-            (is_last && !self.has_found(tried.name)).then_some(tried)
+            let is_last = !later.any(|later| later.is_same(tried));
+            (is_last && !self.has_found(tried)).then_some(tried)
         })
     }
 
     /// Whether an effect was found, or one that predicts the data equally well.
-    fn has_found(&self, name: &str) -> bool {
-        self.effects.iter().any(|effect| effect.name == name || effect.class.contains(&name))
+    fn has_found(&self, tried: &Candidate) -> bool {
+        self.effects.iter().any(|effect| {
+            (effect.name == tried.name && effect.scans == tried.scans)
+                || effect.class.contains(&tried.name)
+        })
     }
 }

@@ -124,7 +124,7 @@ fn sum_over_neighbours(
         for &index in members.get(&[i + di, j + dj]).into_iter().flatten() {
             let (Some(other), Some(z)) = (shots.get(index), z.get(index)) else { continue };
             let apart_m = (other.xt_m - shot.xt_m).hypot(other.yt_m - shot.yt_m);
-            if ring_m.contains(&apart_m) {
+            if ring_m.contains(&apart_m) && other.scan == shot.scan {
                 sum += z;
                 count += 1.0;
             }

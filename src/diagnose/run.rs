@@ -1,13 +1,16 @@
 //! The steps of a diagnosis.
 
+use super::alarms::FalseAlarms;
 use super::answer::{self, Column};
 use super::choose::{Choice, choose_effects};
+use super::contradiction::contradictions;
 use super::controls::controls;
 use super::error::DiagnoseError;
 use super::evidence::Candidate;
 use super::folds::Folds;
+use super::in_scans::{InScans, for_scans};
 use super::matching::MOST_STRAYS;
-use super::problem::{ENOUGH, Problem, Sample};
+use super::problem::{ENOUGH, Problem, Sample, caches};
 use super::remains::{Remainder, find_unexplained};
 use super::report::{Controls, Report, SCHEMA, Verdict};
 use super::residual;
@@ -18,7 +21,8 @@ use super::shared::ALONE;
 use super::space::Space;
 use super::subject::Subject;
 use super::trial::Search;
-use crate::effects::{Effect, PredictionCache, family};
+use super::views::Views;
+use crate::effects::{Effect, family};
 
 /// Multiple of the noise floor beyond which the target is another one: structure that no effect explains leaves less
 /// than two.
@@ -45,39 +49,58 @@ impl Diagnosis {
         effects: &[&dyn Effect],
         notify: &(dyn Fn(&str) + Sync),
     ) -> Result<Report, DiagnoseError> {
-        let Subject { stage, laws, at_work, receiver, declared, .. } = *subject;
+        let Subject { stages, laws, receiver, declared, .. } = *subject;
         let Subject { shots, observations, alarms, .. } = *subject;
         let (block_m, folds, seed) = (self.block_m, self.folds, self.seed);
-        let independent = &Folds::new(shots, block_m, folds, seed);
+        let views = &Views::new(stages)?;
+        let placed = &*views.all_in_first(shots);
+        let independent = &Folds::new(placed, block_m, folds, seed);
         subject.check(independent)?;
-        let traced = &PredictionCache::default();
+        let traced = &*caches(stages.len());
         let shared = &ALONE;
         let alone =
-            Problem { stage, shots, observations, alarms, declared, receiver, shared, traced };
+            Problem { views, shots, observations, alarms, declared, receiver, shared, traced };
         let scorer = Scorer { problem: alone, folds: independent, settings: self };
 
         notify("refitting the scattering models");
-        let space = Space::new(shots, receiver.looks, laws, at_work)?;
+        let declared_effects = &declared_in_scans(subject.at_work, views);
+        let at_work: Vec<(&dyn Effect, Vec<f64>)> = match subject.at_work {
+            [one] => one.to_vec(),
+            _ => declared_effects.iter().map(|(one, v)| (one as &dyn Effect, v.clone())).collect(),
+        };
+        let space = Space::new(shots, receiver.looks, laws, &at_work)?;
         let base = scorer.base(&Sample::new(&alone, ENOUGH), space);
         refuse_another_target(&scorer, &base)?;
         let shared = &scorer.shared_speckle(&base);
         let problem = Problem { shared, ..alone };
-        let folds = &Folds::of_shared(shots, block_m, folds, seed);
+        let folds = &Folds::of_shared(placed, block_m, folds, seed);
         let folds = if shared.is_any() { folds } else { independent };
         let (scorer, sample) =
             (Scorer { problem, folds, settings: self }, &Sample::new(&problem, ENOUGH));
         let base = if shared.is_any() { scorer.again(&base) } else { base };
         let search = Search { scorer, sample, notify };
 
-        let members: Vec<&dyn Effect> = effects.iter().flat_map(|effect| family(*effect)).collect();
+        let in_scans = for_scans(effects, views);
+        let members: Vec<&dyn Effect> = if stages.len() == 1 {
+            effects.iter().flat_map(|effect| family(*effect)).collect()
+        } else {
+            in_scans.iter().map(|one| one as &dyn Effect).collect()
+        };
         let choice = choose_effects(&search, base, &members)?;
         let base = &choice.base;
         let strays = StrayCounts::of(&scorer, subject, &choice.model.state)?;
         refuse_a_poor_fit(&scorer.errors(&choice.model.state.held_out))?;
 
         notify("controls");
-        let simplest = effects.iter().filter_map(|effect| family(*effect).into_iter().next());
-        let simplest: Vec<&dyn Effect> = simplest.collect();
+        // The first member of each family.
+        let mut simplest = members;
+        let mut names = Vec::new();
+        simplest.retain(|effect| {
+            let name = (effect.name(), effect.scans());
+            let is_first = !names.contains(&name);
+            names.push(name);
+            is_first
+        });
         let controls = controls(&search, base, &simplest, numbers_of_controls(&choice.ranking));
 
         notify("testing the remainder");
@@ -93,7 +116,7 @@ fn report(
     strays: StrayCounts,
     controls: Controls,
 ) -> Report {
-    let Choice { base, model, ranking, structure, hidden } = choice;
+    let Choice { base, model, ranking, structure, hidden, .. } = choice;
     let State { space, fit, held_out } = &model.state;
     let prediction = &scorer.predict(&model.state);
     let [z_before, z] = [&scorer.predict(base), prediction].map(|prediction| scorer.z(prediction));
@@ -112,22 +135,45 @@ fn report(
     let columns = [Column { state: base, z: &z_before }, Column { state: &model.state, z: &z }];
     let unknown = &unknown.unwrap_or_default();
     let sd = scorer.problem.sd(space, &fit.at, scorer.folds);
+    let contradictions = contradictions(scorer, choice);
+    let verdict = if contradictions.is_empty() {
+        Verdict::new(!model.added.is_empty(), !unexplained.is_empty())
+    } else {
+        Verdict::Contradictory
+    };
+    let views = scorer.problem.views;
     Report {
         schema: SCHEMA,
-        verdict: Verdict::new(!model.added.is_empty(), !unexplained.is_empty()),
-        effects: answer::effects(model, &sd, subject.shots),
+        verdict,
+        effects: answer::effects(model, &sd, &views.all_in_first(subject.shots)),
         ranking: ranking.clone(),
         unexplained,
         error: answer::before_after(scorer, errors, with_unknown),
-        set_aside: subject.strays.len(),
+        set_aside: subject.strays.iter().map(Vec::len).sum(),
         beside_edge: strays.beside_edge,
-        false_alarms: subject.alarms.counted(&subject.receiver, subject.declared),
+        false_alarms: false_alarms(subject),
         independent_chirps: scorer.problem.independent_shots(),
         controls,
+        clouds: answer::clouds(scorer, base, &model.state, &sd),
+        contradictions,
         base: answer::base(subject, &model.state, &sd),
-        laws: space.model(subject.receiver, &fit.at).laws,
-        rows: answer::rows(subject, prediction, scorer.folds, columns, unknown),
+        laws: space.model(subject.receiver, &fit.at, 0).laws,
+        rows: answer::rows(subject, views, prediction, scorer.folds, columns, unknown),
     }
+}
+
+/// The declared effects of several scans, each on its own scan.
+fn declared_in_scans<'a>(
+    at_work: &[&[(&'a dyn Effect, Vec<f64>)]],
+    views: &'a Views<'a>,
+) -> Vec<(InScans<'a>, Vec<f64>)> {
+    let mut all = Vec::new();
+    for (scan, effects) in at_work.iter().enumerate() {
+        for (effect, values) in *effects {
+            all.push((InScans::new(*effect, vec![scan as u16], views), values.clone()));
+        }
+    }
+    all
 }
 
 /// Refuses data that the refitted base is far off in many places. Judged with much speckle: that there is some
@@ -144,6 +190,13 @@ fn refuse_another_target(scorer: &Scorer, base: &State) -> Result<(), DiagnoseEr
     Ok(())
 }
 
+/// The false alarms of all clouds.
+fn false_alarms(subject: &Subject) -> FalseAlarms {
+    let each = subject.alarms.iter();
+    let each = each.map(|alarms| alarms.counted(&subject.receiver, subject.declared));
+    each.reduce(FalseAlarms::and).unwrap_or_default()
+}
+
 /// How many of the detections that belong to no shot are where.
 #[derive(Clone, Copy)]
 struct StrayCounts {
@@ -158,20 +211,22 @@ struct StrayCounts {
 impl StrayCounts {
     /// Of a model, or a refusal if many are off the target.
     fn of(scorer: &Scorer, subject: &Subject, state: &State) -> Result<StrayCounts, DiagnoseError> {
-        let model = state.space.model(scorer.problem.receiver, &state.fit.at);
         let mut counts = StrayCounts { beside_edge: 0, past_the_spot: 0, off_target: 0 };
-        for stray in subject.strays {
-            let is_beside_edge = stray.is_beside_edge(&model, subject.stage);
-            let is_missed = usize::from(!stray.is_on_target(&model, subject.stage));
-            if is_beside_edge {
-                counts.beside_edge += 1;
-                counts.past_the_spot += is_missed;
-            } else {
-                counts.off_target += is_missed;
+        for (scan, (strays, alarms)) in subject.strays.iter().zip(subject.alarms).enumerate() {
+            let model = state.space.model(scorer.problem.receiver, &state.fit.at, scan as u16);
+            let (stage, mut off_target) = (&subject.stages[scan], 0);
+            for stray in strays {
+                let is_missed = usize::from(!stray.is_on_target(&model, stage));
+                if stray.is_beside_edge(&model, stage) {
+                    counts.beside_edge += 1;
+                    counts.past_the_spot += is_missed;
+                } else {
+                    off_target += is_missed;
+                }
             }
+            counts.off_target += alarms.beyond_chance(off_target);
         }
-        counts.off_target = subject.alarms.beyond_chance(counts.off_target);
-        let points = subject.strays.len() + subject.detected();
+        let points = subject.strays.iter().map(Vec::len).sum::<usize>() + subject.detected();
         if counts.off_target as f64 > MOST_STRAYS * points as f64 {
             let matched = points - counts.off_target;
             return Err(DiagnoseError::Elsewhere { matched, points });

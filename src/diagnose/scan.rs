@@ -1,5 +1,7 @@
 //! The diagnosis of a cloud against the scene that was measured.
 
+use glam::DVec3;
+
 use super::error::DiagnoseError;
 use super::matching::match_cloud;
 use super::observation::ReceiverLimits;
@@ -44,41 +46,86 @@ impl MeasuredScene<'_> {
         effects: &[&dyn Effect],
         notify: &(dyn Fn(&str) + Sync),
     ) -> Result<Report, DiagnoseError> {
-        let MeasuredScene { scene, cloud, laws, seen_lobe_rad, declared_effects } = *self;
+        diagnose_together(&[*self], seed, effects, notify)
+    }
+}
+
+/// Diagnoses several clouds of one target together, trying these effects; `notify` receives a few words about each step.
+/// The scenes have the same regions with the same materials, and the laws are those of the first.
+///
+/// # Errors
+/// When the data are too few for an answer, or are not of these scenes; when meshes or receivers differ.
+pub fn diagnose_together(
+    measured: &[MeasuredScene],
+    seed: u64,
+    effects: &[&dyn Effect],
+    notify: &(dyn Fn(&str) + Sync),
+) -> Result<Report, DiagnoseError> {
+    let Some(first) = measured.first() else {
+        return Err(DiagnoseError::TooFew { detected: 0 });
+    };
+    let targets = measured.iter().map(|one| &one.scene.target);
+    let bvhs: Vec<Bvh> = targets.clone().map(|target| Bvh::new(&target.mesh)).collect();
+    let grains: Vec<Vec<DVec3>> =
+        targets.map(|target| target.regions.iter().map(|region| region.grain).collect()).collect();
+    let (receiver, declared) = declared_receiver(first.scene.radar());
+    let (mut stages, mut shots) = (Vec::new(), Vec::new());
+    let (mut observations, mut strays, mut alarms) = (Vec::new(), Vec::new(), Vec::new());
+    for (number, one) in measured.iter().enumerate() {
+        if one.received() != first.received() {
+            return Err(DiagnoseError::OtherReceiver { cloud: number + 1 });
+        }
+        let MeasuredScene { scene, cloud, seen_lobe_rad, .. } = *one;
         let radar = scene.radar();
         // Every chirp against the target.
-        let bvh = Bvh::new(&scene.target.mesh);
-        let grain_of_region: Vec<_> = scene.target.regions.iter().map(|r| r.grain).collect();
+        let (bvh, region_of_facet) = (&bvhs[number], &scene.target.region_of_facet);
         let mut stage = Stage {
-            geometry: ScanGeometry::new(radar, &scene.chirps, &bvh, &scene.target.region_of_facet),
+            geometry: ScanGeometry::new(radar, &scene.chirps, bvh, region_of_facet),
             link: Link::new(radar),
-            grain_of_region: &grain_of_region,
+            grain_of_region: &grains[number],
             seen_lobe_rad,
             on_wavefront: false,
-            middle: glam::DVec3::ZERO,
+            middle: DVec3::ZERO,
         };
-        let shots = trace_shots(&stage)?;
-        stage.middle = middle(&shots);
+        let mut own = trace_shots(&stage)?;
+        stage.middle = middle(&own);
         // The cloud against the chirps.
-        let (receiver, declared) = declared_receiver(radar);
         let mut matched =
-            match_cloud(cloud, &scene.chirps, &shots, declared.threshold_w, radar.returns)?;
+            match_cloud(cloud, &scene.chirps, &own, declared.threshold_w, radar.returns)?;
         matched.alarms.cells = radar.gate_cells();
         matched.alarms.looks = radar.noise_looks();
-        let subject = Subject {
-            stage: &stage,
-            laws,
-            at_work: declared_effects,
-            receiver,
-            declared,
-            shots: &shots,
-            observations: &matched.observations,
-            strays: &matched.strays,
-            alarms: &matched.alarms,
-            pose: &poses(scene),
-        };
-        Diagnosis { seed, ..Diagnosis::for_spot(radar.spot_fwhm_m()) }
-            .run_with(&subject, effects, notify)
+        let of_strays = matched.strays.iter_mut().filter_map(|stray| stray.shot.as_mut());
+        own.iter_mut().chain(of_strays).for_each(|shot| shot.scan = number as u16);
+        stages.push(stage);
+        shots.extend(own);
+        observations.extend(matched.observations);
+        strays.push(matched.strays);
+        alarms.push(matched.alarms);
+    }
+    let at_work: Vec<_> = measured.iter().map(|one| one.declared_effects).collect();
+    let subject = Subject {
+        stages: &stages,
+        laws: first.laws,
+        at_work: &at_work,
+        receiver,
+        declared,
+        shots: &shots,
+        observations: &observations,
+        strays: &strays,
+        alarms: &alarms,
+        pose: &measured.iter().flat_map(|one| poses(one.scene)).collect::<Vec<_>>(),
+    };
+    let spots_m = stages.iter().map(|stage| stage.geometry.radar.spot_fwhm_m());
+    Diagnosis { seed, ..Diagnosis::for_spot(spots_m.fold(0.0, f64::max)) }
+        .run_with(&subject, effects, notify)
+}
+
+impl MeasuredScene<'_> {
+    /// The receiver with the declared effects on it, and its limits.
+    fn received(&self) -> (Receiver, ReceiverLimits) {
+        let (receiver, limits) = declared_receiver(self.scene.radar());
+        let effects = self.declared_effects.iter();
+        (effects.fold(receiver, |receiver, (effect, v)| effect.receive(v, receiver)), limits)
     }
 }
 

@@ -68,10 +68,8 @@ impl Scorer<'_> {
 
     /// The model without effects. It is searched from the stored laws, and from the best of all shapes of each, on a
     /// sample.
-    pub fn base<'a>(&self, sample: &Sample, mut space: Space<'a>) -> State<'a> {
-        if !self.problem.stage.geometry.radar.calibrated {
-            space.ln_level = Some(self.problem.ln_level(&space));
-        }
+    pub fn base<'a>(&self, sample: &Sample, space: Space<'a>) -> State<'a> {
+        let space = self.problem.with_levels(space);
         let receiver = with_wide_speckle(self.problem.receiver);
         let wide = Problem { receiver, ..sample.problem(&self.problem) };
         let near = wide.fit(&space, &space.start(), &[], &SEARCH).at;
@@ -187,7 +185,9 @@ impl Scorer<'_> {
         let Problem { observations, alarms, declared, .. } = self.problem;
         let [before, after] = [self.predict(state), self.problem.predict(space, at)];
         let size = Size::of(observations, &before, &after);
-        let of_alarms_db = alarms.size_db([&before.receiver, &after.receiver], declared);
+        let receivers = [&before.receiver, &after.receiver];
+        let of_alarms = alarms.iter().map(|alarms| alarms.size_db(receivers, declared));
+        let of_alarms_db = of_alarms.fold(0.0, f64::max);
         Size { mean_db: size.mean_db.max(of_alarms_db), ..size }
     }
 
@@ -209,7 +209,17 @@ impl Scorer<'_> {
     /// The swing of residuals with the chirp number.
     pub fn swing(&self, prediction: &Prediction, z: &[f64]) -> Option<ResidualStructure> {
         let Problem { shots, shared, .. } = self.problem;
-        order::swing(z, shots, shared, speckle_sd_db(prediction.receiver.looks))
+        let sd_db = speckle_sd_db(prediction.receiver.looks);
+        let (mut from, mut found) = (0, None::<ResidualStructure>);
+        for shots in shots.chunk_by(|a, b| a.scan == b.scan) {
+            let swing = order::swing(&z[from..from + shots.len()], shots, shared, sd_db);
+            from += shots.len();
+            found = found
+                .into_iter()
+                .chain(swing)
+                .max_by(|a, b| a.strength_db.total_cmp(&b.strength_db));
+        }
+        found
     }
 
     /// The structure too fine for a field that neighbours in place or in time share beside a model, dB; 0 where chance
@@ -228,9 +238,10 @@ impl Scorer<'_> {
         SharedSpeckle::of(&z, self.problem.observations, self.problem.shots, self.spot_m())
     }
 
-    /// Diameter of the spot, m.
+    /// Diameter of the largest spot, m.
     fn spot_m(&self) -> f64 {
-        self.problem.stage.geometry.radar.spot_fwhm_m()
+        let spots_m = self.problem.views.stages.iter().map(|s| s.geometry.radar.spot_fwhm_m());
+        spots_m.fold(0.0, f64::max)
     }
 
     /// The structure that a field finds beside a model.

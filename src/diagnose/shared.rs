@@ -81,7 +81,7 @@ impl Neighbours<'_> {
         let squares = (-1..=1).flat_map(move |di| (-1..=1).map(move |dj| [i + di, j + dj]));
         squares
             .flat_map(|square| self.members.get(&square).into_iter().flatten())
-            .filter(move |&&other| other != index)
+            .filter(move |&&other| other != index && self.shots[other].scan == shot.scan)
             .map(|&other| (other, distance_m(shot, &self.shots[other])))
             .filter(|(_, apart_m)| *apart_m < self.farthest_m)
     }
@@ -154,6 +154,12 @@ impl SharedSpeckle {
     /// As many independent shots scatter as much in the third powers of their residuals.
     pub fn count_of_cubes(&self, shots: usize) -> f64 {
         self.cubes * self.count(shots)
+    }
+
+    /// The weights of some of the shots.
+    pub fn part(&self, shots: std::ops::Range<usize>) -> SharedSpeckle {
+        let weights = self.weights.get(shots).unwrap_or_default().to_vec();
+        SharedSpeckle { weights, ..*self }
     }
 
     /// The weights of every n-th shot.

@@ -1,13 +1,14 @@
-//! The unknowns of a model: the coordinates of every scattering model that is fitted, after them ln of the radar's level
-//! where that is not calibrated, and after it the parameters of the effects in units of their steps.
+//! The unknowns of a model: the coordinates of every scattering model that is fitted, after them ln of the level of every
+//! radar that is not calibrated, and after these the parameters of the effects in units of their steps.
 
 use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::level::{MOST_OFF_DB, off_the_stored, prior};
 use super::observation::DB;
+use super::views::Views;
 use crate::brdf::Brdf;
-use crate::effects::{Effect, Model, Receiver, Shot, Stage, Twist, rank};
+use crate::effects::{Effect, Model, Receiver, Shot, Twist, rank};
 use crate::fit::FitError;
 use crate::fit::coordinates::{Coordinates, frequencies};
 use crate::fit::minimise::Local;
@@ -23,9 +24,11 @@ pub(super) struct Space<'a> {
     laws: Vec<Brdf>,
     /// Regions whose scattering models are fitted, and the coordinates of these.
     free: Vec<(usize, Coordinates)>,
-    /// ln of the level of the radar over the one that its settings state, where a search starts; none for a radar that
+    /// ln of the level of each radar over the one that its settings state, where a search starts; none of a radar that
     /// was calibrated.
-    pub ln_level: Option<f64>,
+    pub ln_levels: Vec<f64>,
+    /// The level of each scan by its place among those; one for each scan.
+    pub level_of_scan: Vec<Option<usize>>,
     /// Effects at declared values.
     declared: &'a [(&'a dyn Effect, Vec<f64>)],
     pub effects: Vec<&'a dyn Effect>,
@@ -63,7 +66,9 @@ impl<'a> Space<'a> {
                 free.push((region, coordinates.lowering_levels()));
             }
         }
-        Ok(Space { laws: laws.to_vec(), free, ln_level: None, declared, effects: Vec::new() })
+        let (ln_levels, level_of_scan) = (Vec::new(), Vec::new());
+        let laws = laws.to_vec();
+        Ok(Space { laws, free, ln_levels, level_of_scan, declared, effects: Vec::new() })
     }
 
     /// The space with one more effect.
@@ -93,9 +98,14 @@ impl<'a> Space<'a> {
         (space.with(first), Space::joined(&at, first, &values))
     }
 
-    /// Whether the space has an effect of this name.
-    pub fn has(&self, name: &str) -> bool {
-        self.effects.iter().any(|effect| effect.name() == name)
+    /// Whether the space has an effect of this name on any of these scans; on any for an empty list.
+    pub fn has(&self, name: &str, scans: &[u16]) -> bool {
+        let is_it = |effect: &&dyn Effect| {
+            let own = effect.scans();
+            let share = own.is_empty() || scans.is_empty() || own.iter().any(|s| scans.contains(s));
+            effect.name() == name && share
+        };
+        self.effects.iter().any(is_it)
     }
 
     /// Unknowns of the effects for which rays must be traced anew. They are few, and another effect
@@ -129,12 +139,12 @@ impl<'a> Space<'a> {
 
     /// How the target moves at every shot per unit of each of the unknowns of [`Space::moving`]. Of two effects that move
     /// the target the second is taken not to turn it.
-    pub fn twists(&self, at: &DVector<f64>, stage: &Stage, shots: &[Shot]) -> Vec<Vec<Twist>> {
+    pub fn twists(&self, at: &DVector<f64>, views: &Views, shots: &[Shot]) -> Vec<Vec<Twist>> {
         let values = self.effect_values(at);
         let twists_of = |shot: &Shot| {
             let mut all = Vec::new();
             for (effect, values) in self.effects.iter().zip(&values) {
-                let twists = effect.twists(values, stage, shot);
+                let twists = effect.twists(values, views.stage(shot), shot);
                 let known = effect.parameters().iter().zip(twists);
                 all.extend(known.map(|(known, twist)| twist.map(|by| by * known.step)));
             }
@@ -143,9 +153,9 @@ impl<'a> Space<'a> {
         shots.par_iter().map(twists_of).collect()
     }
 
-    /// Number of unknowns of the scattering models and of the level, which come first.
+    /// Number of unknowns of the scattering models and of the levels, which come first.
     pub fn base_len(&self) -> usize {
-        self.laws_len() + usize::from(self.ln_level.is_some())
+        self.laws_len() + self.ln_levels.len()
     }
 
     /// Number of those that belong to the scattering models.
@@ -153,9 +163,10 @@ impl<'a> Space<'a> {
         self.free.iter().map(|(_, coordinates)| coordinates.len()).sum()
     }
 
-    /// The unknown that is ln of the level; none for a calibrated radar.
-    pub fn level_index(&self) -> Option<usize> {
-        self.ln_level.map(|_| self.laws_len())
+    /// The unknown that is ln of the level of a scan; none for a calibrated radar.
+    pub fn level_index(&self, scan: usize) -> Option<usize> {
+        let level = self.level_of_scan.get(scan).copied().flatten()?;
+        Some(self.laws_len() + level)
     }
 
     /// Each fitted law's coordinates, with the place of the first among all unknowns.
@@ -167,12 +178,13 @@ impl<'a> Space<'a> {
         })
     }
 
-    /// What is added to −ln p, since data do not tell the level from the scale of the laws; nothing for a calibrated
-    /// radar.
+    /// What is added to −ln p, since data do not tell the level from the scale of the laws; nothing for calibrated
+    /// radars.
     pub fn prior(&self, at: &DVector<f64>) -> Local {
-        match self.ln_level {
-            Some(_) => prior(self.laws_with_places(), at),
-            None => Local::zero(at.len()),
+        if self.ln_levels.is_empty() {
+            Local::zero(at.len())
+        } else {
+            prior(self.laws_with_places(), at)
         }
     }
 
@@ -182,7 +194,7 @@ impl<'a> Space<'a> {
         for (_, coordinates) in &self.free {
             start.extend(coordinates.start().iter());
         }
-        start.extend(self.ln_level);
+        start.extend(&self.ln_levels);
         DVector::from_vec(start)
     }
 
@@ -263,8 +275,8 @@ impl<'a> Space<'a> {
         self.parameters_in_use(at) as f64 + off_the_stored(self.laws_with_places(), at)
     }
 
-    /// The model at a point.
-    pub fn model(&self, receiver: Receiver, at: &DVector<f64>) -> Model<'a> {
+    /// The model of a scan at a point.
+    pub fn model(&self, receiver: Receiver, at: &DVector<f64>, scan: u16) -> Model<'a> {
         let mut laws = self.laws.clone();
         let mut from = 0;
         for (region, coordinates) in &self.free {
@@ -275,22 +287,25 @@ impl<'a> Space<'a> {
             }
         }
         let found = self.effects.iter().copied().zip(self.effect_values(at));
-        let found = found.map(|(effect, values)| match effect.whole(&values) {
+        let all = self.declared.iter().cloned().chain(found);
+        let all = all.filter(|(effect, _)| acts_on(*effect, scan));
+        let all = all.map(|(effect, values)| match effect.whole(&values) {
             Some((whole, all)) => (whole as &dyn Effect, all),
             None => (effect, values),
         });
-        let mut effects: Vec<_> = self.declared.iter().cloned().chain(found).collect();
+        let mut effects: Vec<_> = all.collect();
         effects.sort_by_key(|(effect, _)| rank(effect.name()));
-        let level = self.level_index().map_or(1.0, |index| at[index].exp());
+        let level = self.level_index(usize::from(scan)).map_or(1.0, |index| at[index].exp());
         Model { laws, receiver, effects, level }
     }
 
-    /// The receiver at a point.
+    /// The receiver at a point, which is that of every scan.
     pub fn received(&self, receiver: Receiver, at: &DVector<f64>) -> Receiver {
         let found = self.effects.iter().copied().zip(self.effect_values(at));
         let declared = self.declared.iter().cloned();
         declared
             .chain(found)
+            .filter(|(effect, _)| acts_on(*effect, 0))
             .fold(receiver, |receiver, (effect, values)| effect.receive(&values, receiver))
     }
 
@@ -301,7 +316,7 @@ impl<'a> Space<'a> {
             lower.extend(coordinates.lower().iter());
             upper.extend(coordinates.upper().iter());
         }
-        if self.ln_level.is_some() {
+        for _ in &self.ln_levels {
             lower.push(-MOST_OFF_DB / DB);
             upper.push(MOST_OFF_DB / DB);
         }
@@ -311,6 +326,11 @@ impl<'a> Space<'a> {
         }
         [DVector::from_vec(lower), DVector::from_vec(upper)]
     }
+}
+
+/// Whether an effect acts on a scan.
+fn acts_on(effect: &dyn Effect, scan: u16) -> bool {
+    effect.scans().is_empty() || effect.scans().contains(&scan)
 }
 
 /// A point with one unknown moved within bounds.

@@ -20,24 +20,24 @@ const LOOKS: std::ops::RangeInclusive<f64> = 0.1..=1e4;
 /// What a diagnosis starts from: everything declared of the scan.
 #[derive(Clone, Copy)]
 pub struct Subject<'a> {
-    /// Instrument and target.
-    pub stage: &'a Stage<'a>,
+    /// Instrument and target of each scan: of one, or of several of one target.
+    pub stages: &'a [Stage<'a>],
     /// Scattering model of each region, where the refit begins.
     pub laws: &'a [Brdf],
-    /// Declared effects, at fixed values.
-    pub at_work: &'a [(&'a dyn Effect, Vec<f64>)],
+    /// Declared effects of each scan, at fixed values.
+    pub at_work: &'a [&'a [(&'a dyn Effect, Vec<f64>)]],
     /// The receiver without effects; its looks lie between 0.1 and 10⁴.
     pub receiver: Receiver,
     /// Threshold and range error.
     pub declared: ReceiverLimits,
-    /// Every chirp that meets the target.
+    /// Every chirp that meets the target, scan after scan.
     pub shots: &'a [Shot],
     /// The observation of each shot.
     pub observations: &'a [Observation],
-    /// Detections that belong to no shot and are no false alarms.
-    pub strays: &'a [Stray],
-    /// What the chirps report that see no target.
-    pub alarms: &'a Alarms,
+    /// Detections of each scan that belong to no shot and are no false alarms.
+    pub strays: &'a [Vec<Stray>],
+    /// What the chirps of each scan report that see no target.
+    pub alarms: &'a [Alarms],
     /// Poses of the meshes, for the report.
     pub pose: &'a [MeshPose],
 }

@@ -2,6 +2,7 @@
 
 use std::cell::OnceCell;
 
+use super::clouds;
 use super::evidence::{Candidate, Largest};
 use super::field::Structure;
 use super::scorer::{HeldOut, Scorer, State};
@@ -24,7 +25,7 @@ const SHARE_KEPT: f64 = 0.6;
 /// Gain of such an effect, in least gains.
 const FAR_BEYOND: f64 = 4.0;
 /// Standard errors of a held-out gain that leaves no doubt.
-const NO_DOUBT: f64 = 4.0;
+pub(super) const NO_DOUBT: f64 = 4.0;
 
 /// What speaks for an effect.
 pub(super) struct Claim {
@@ -112,6 +113,11 @@ impl<'j, 'p, 'a> Judge<'j, 'p, 'a> {
                 && self.scorer.is_farther_off(&held_out, &self.state.held_out))
             || (is_spread && self.is_structure_of_means(trial))
         {
+            return None;
+        }
+        trial.candidate.by_cloud = clouds::gains(&self.scorer, &held_out, &self.state.held_out);
+        // It must hold in each of several clouds.
+        if trial.candidate.is_excluded() {
             return None;
         }
         Some((held_out, claim.counts()))

@@ -18,7 +18,7 @@ use crate::effects::{
     About, Effect, EffectParameter, Level, Model, Place, PredictionCache, Receiver, Shot, Stage,
     find,
 };
-use crate::frames::{Point, Ray};
+use crate::frames::{Global, Point, Pose, Ray};
 use crate::geometry::Mesh;
 use crate::radar::random::{Key, Purpose};
 use crate::radar::{Chirps, Link, Radar, Returns};
@@ -243,7 +243,7 @@ fn diagnosed_of(
     let start = near_law();
     let (shots, observations, laws) = (&shots[..], &observations[..], &[start][..]);
     let subject = Subject {
-        stage: &stage,
+        stages: &[stage],
         laws,
         at_work: &[],
         receiver,
@@ -251,7 +251,7 @@ fn diagnosed_of(
         shots,
         observations,
         strays: &[],
-        alarms: &Alarms::default(),
+        alarms: &[Alarms::default()],
         pose: &[],
     };
     let started = std::time::Instant::now();
@@ -465,7 +465,7 @@ fn a_scan_with_too_little_says_so() {
     let declared = ReceiverLimits { threshold_w: 1e-11, range_sd_m: RANGE_SD_M };
     let observations = vec![Observation::default(); shots.len()];
     let subject = Subject {
-        stage: &stage,
+        stages: &[stage],
         laws: &[law()],
         at_work: &[],
         receiver,
@@ -473,7 +473,7 @@ fn a_scan_with_too_little_says_so() {
         shots: &shots,
         observations: &observations,
         strays: &[],
-        alarms: &Alarms::default(),
+        alarms: &[Alarms::default()],
         pose: &[],
     };
     let refused = |powers_w: &dyn Fn(usize) -> f64| {
@@ -685,4 +685,212 @@ fn a_wide_spot_sees_past_the_edge() {
     let behind =
         match_cloud(&cloud(0.5), chirps, &shots, THRESHOLD_W, Returns::Strongest).unwrap_err();
     assert!(matches!(behind, DiagnoseError::Elsewhere { matched: 0, .. }), "{behind}");
+}
+
+/// One of several scans that are diagnosed together, with the truth of its data.
+struct Part {
+    bench: Bench,
+    laws: Vec<Brdf>,
+    effects: Vec<(&'static dyn Effect, Vec<f64>)>,
+    level_db: f64,
+    seed: u64,
+}
+
+impl Part {
+    /// The target turned about its vertical axis, deg, seen by a radar of this power, dBm.
+    fn new(turn_deg: f64, transmit_power_dbm: f64, seed: u64) -> Part {
+        let mut mesh = target();
+        let turn = Pose::<Global, Global>::from_euler_xyz(
+            DVec3::new(0.0, turn_deg.to_radians(), 0.0),
+            DVec3::ZERO,
+        );
+        mesh.vertices.iter_mut().for_each(|v| *v = (turn * Point::from(*v)).xyz);
+        let mut bench = Bench::new(mesh);
+        bench.radar.transmit_power_dbm = transmit_power_dbm;
+        Part { bench, laws: vec![law()], effects: Vec::new(), level_db: 0.0, seed }
+    }
+
+    /// What the chirps of the scan report, by the observation model. `regions`: the region of every facet in truth.
+    fn observations(&self, regions: &[u16], shots: &[Shot]) -> Vec<Observation> {
+        let stage = self.bench.stage();
+        let stage = Stage {
+            geometry: ScanGeometry { region_of_facet: regions, ..stage.geometry },
+            ..stage
+        };
+        let in_truth: Vec<Shot> = shots
+            .iter()
+            .map(|shot| Shot { region: regions[shot.hit.facet as usize], ..*shot })
+            .collect();
+        let (laws, effects) = (self.laws.clone(), self.effects.clone());
+        let level = 10f64.powf(0.1 * self.level_db);
+        let model = Model { laws, receiver: receiver(), effects, level };
+        let prediction = model.predict(&stage, &in_truth);
+        let mut seen = Vec::new();
+        for (shot, arrived) in prediction.arrived.iter().enumerate() {
+            let key =
+                Key { seed: self.seed, chirp: shot as u64, sub_ray: 0, purpose: Purpose::Speckle };
+            let (mut draws, arrived) = (key.draws(), arrived.unwrap());
+            let power_w = (arrived.power_w + receiver().noise_w) * draws.gamma(receiver().looks);
+            let range_m = arrived.range_m + RANGE_SD_M * draws.gaussian();
+            let is_seen = power_w >= THRESHOLD_W;
+            seen.push(if is_seen {
+                Observation { power_w: Some(power_w), range_m: Some(range_m) }
+            } else {
+                Observation::default()
+            });
+        }
+        seen
+    }
+}
+
+fn receiver() -> Receiver {
+    Receiver { looks: 4.0, noise_w: watts_from_dbm(-100.0), ..Receiver::LINEAR }
+}
+
+/// The joint report on some scans, by a model of one region.
+fn diagnosed_together(parts: &[Part], library: &[&'static dyn Effect]) -> Report {
+    let regions: Vec<Vec<u16>> = parts.iter().map(|part| part.bench.regions.clone()).collect();
+    diagnosed_as(parts, &regions, library)
+}
+
+/// As [`diagnosed_together`], where the facets are of these regions in truth.
+fn diagnosed_as(parts: &[Part], regions: &[Vec<u16>], library: &[&'static dyn Effect]) -> Report {
+    let stages: Vec<Stage> = parts.iter().map(|part| part.bench.stage()).collect();
+    let (mut shots, mut observations) = (Vec::new(), Vec::new());
+    for (scan, (part, stage)) in parts.iter().zip(&stages).enumerate() {
+        let mut own = trace_shots(stage).unwrap();
+        own.iter_mut().for_each(|shot| shot.scan = scan as u16);
+        observations.extend(part.observations(&regions[scan], &own));
+        shots.extend(own);
+    }
+    let mut start = law();
+    start.set_parameter("specular.m", 0.08);
+    let declared = ReceiverLimits { threshold_w: THRESHOLD_W, range_sd_m: RANGE_SD_M };
+    let subject = Subject {
+        stages: &stages,
+        laws: &[start],
+        at_work: &[],
+        receiver: receiver(),
+        declared,
+        shots: &shots,
+        observations: &observations,
+        strays: &vec![Vec::new(); parts.len()],
+        alarms: &vec![Alarms::default(); parts.len()],
+        pose: &[],
+    };
+    Diagnosis { seed: 3, ..Diagnosis::default() }.run(&subject, library).unwrap()
+}
+
+#[test]
+fn two_poses_of_a_complete_target_share_its_laws_and_have_levels_of_their_own() {
+    let second = Part { level_db: 3.0, ..Part::new(12.0, 10.0, 2) };
+    let report = diagnosed_together(&[Part::new(0.0, 7.0, 1), second], &LIBRARY);
+    assert_eq!(report.verdict, Verdict::NoMissingEffect, "{report:#?}");
+    let [a, b] = &report.clouds[..] else { panic!("{:?}", report.clouds) };
+    let [a_db, b_db] = [a, b].map(|part| part.level_db.unwrap().value);
+    // The difference of two levels of 2 400 shots of 4 looks each has the deviation 0.06 dB, and laws take a part.
+    assert!((b_db - a_db - 3.0).abs() < 0.3, "{a_db} {b_db}");
+    assert!(report.clouds.iter().all(|part| part.chirps > 2000 && part.detected > 1000));
+    let m = report.base.parameters.iter().find(|number| number.name == "specular.m").unwrap();
+    let sd = m.value.sd.unwrap();
+    assert!((m.value.value - 0.1).abs() < 4.0 * sd && sd < 0.01, "{m:?}");
+    // Both scans are of one table.
+    assert_eq!(report.rows.iter().filter(|row| row.scan == 1).count(), b.chirps);
+    assert_row_errors(&report);
+}
+
+#[test]
+fn a_drift_of_one_of_two_instruments_is_named_for_that_one() {
+    let second = Part { effects: vec![(&DRIFT, vec![3.0])], ..Part::new(12.0, 10.0, 2) };
+    let report = diagnosed_together(&[Part::new(0.0, 7.0, 1), second], &LIBRARY);
+    assert_eq!(report.verdict, Verdict::Explained, "{report:#?}");
+    let found: Vec<_> = report.effects.iter().map(|one| (one.name, &one.scans[..])).collect();
+    assert_eq!(found, [("drift", &[1u16][..])]);
+    let Value { value, sd, .. } = report.effects[0].parameters["edge_db"];
+    assert!((value - 3.0).abs() < 4.0 * sd.unwrap(), "{value} {sd:?}");
+    let [first, second] = report.effects[0].evidence.by_cloud[..] else { panic!() };
+    assert!(second.gain > 4.0 * second.se && first.gain.abs() < 0.1 * second.gain);
+    assert!(report.clouds[1].before.rmse_db > report.clouds[1].after.rmse_db + 0.05);
+}
+
+/// The place is one of the target, not of the field of view: 12° move it by 10 cm there.
+#[test]
+fn a_patch_that_two_poses_see_gains_more_than_in_either() {
+    let patch = [find("foreign-patch").unwrap()];
+    let part = |turn_deg: f64, seed: u64| {
+        let mut bright = law();
+        bright.set_parameter("specular.f_lambda", 0.22);
+        bright.set_parameter("diffuse.r_s", 0.12);
+        Part { laws: vec![law(), bright], ..Part::new(turn_deg, 7.0, seed) }
+    };
+    // Facets of the target itself within 9 cm of a place on the sphere.
+    let mesh = target();
+    let centre = DVec3::new(0.2, 1.2, 0.1 + 0.32);
+    let of_facet = |facet: &[u32; 3]| {
+        let middle = facet.iter().map(|v| mesh.vertices[*v as usize]).sum::<DVec3>() / 3.0;
+        u16::from(middle.distance(centre) < 0.09)
+    };
+    let regions: Vec<u16> = mesh.facets.iter().map(of_facet).collect();
+    let alone = [part(0.0, 1), part(12.0, 2)].map(|part| {
+        let report = diagnosed_as(&[part], std::slice::from_ref(&regions), &patch);
+        report.effects.first().unwrap().evidence.held_out_gain
+    });
+    let both = [part(0.0, 1), part(12.0, 2)];
+    let report = diagnosed_as(&both, &[regions.clone(), regions], &patch);
+    assert_eq!(report.effects.len(), 1, "{report:#?}");
+    let gain = report.effects[0].evidence.held_out_gain;
+    assert!(alone.iter().all(|one| gain > 1.4 * one), "{gain} {alone:?}");
+    let place = report.effects[0].parameters.triples["centre_m"].value;
+    assert!(DVec3::from(place).distance(centre) < 0.04, "{place:?}");
+}
+
+#[test]
+fn a_cloud_of_another_material_contradicts_the_others() {
+    let mut other = law();
+    other.set_parameter("specular.m", 0.25);
+    other.set_parameter("diffuse.alpha", 1.0);
+    let second = Part { laws: vec![other], ..Part::new(12.0, 7.0, 2) };
+    let report = diagnosed_together(&[Part::new(0.0, 7.0, 1), second], &LIBRARY);
+    assert_eq!(report.verdict, Verdict::Contradictory, "{report:#?}");
+    let first = &report.contradictions[0];
+    assert!(
+        first.effect.is_none() && first.gain > 4.0 * first.se && first.size_db > 0.3,
+        "{first:?}"
+    );
+}
+
+/// One instrument has one drift.
+#[test]
+fn an_effect_that_one_cloud_excludes_is_a_contradiction() {
+    let second = Part { effects: vec![(&DRIFT, vec![4.0])], ..Part::new(12.0, 7.0, 2) };
+    let report = diagnosed_together(&[Part::new(0.0, 7.0, 1), second], &LIBRARY);
+    assert_eq!(report.verdict, Verdict::Contradictory, "{report:#?}");
+    assert!(report.effects.is_empty(), "{:#?}", report.effects);
+    let of_drift = report.contradictions.iter().find(|one| one.effect == Some("drift")).unwrap();
+    assert_eq!(of_drift.cloud, 1);
+}
+
+#[test]
+fn the_first_scan_sees_the_points_of_the_others_where_they_are() {
+    let parts = [Part::new(0.0, 7.0, 1), Part::new(12.0, 7.0, 2), Part::new(-5.0, 9.0, 3)];
+    let stages: Vec<Stage> = parts.iter().map(|part| part.bench.stage()).collect();
+    let views = views::Views::new(&stages).unwrap();
+    assert_eq!(views.instruments(), [0, 0, 2]);
+    let mut hidden = 0;
+    let shots = trace_shots(&stages[1]).unwrap();
+    for shot in &shots {
+        let there = views.in_first(&Shot { scan: 1, ..*shot });
+        // Its ray meets the same facet, unless something stands before it.
+        let hit = stages[0].geometry.bvh.closest(&there.ray).unwrap();
+        if hit.facet == shot.hit.facet {
+            assert!(hit.point.xyz.distance(there.hit.point.xyz) < 1e-9);
+        } else {
+            hidden += 1;
+        }
+    }
+    assert!(hidden < shots.len() / 20, "{hidden}");
+    // Another mesh is another target.
+    let other = Bench::new(solids::plate(0.9, 0.9));
+    let refused = [stages[0], other.stage()];
+    assert!(matches!(views::Views::new(&refused), Err(DiagnoseError::OtherTarget { cloud: 2 })));
 }

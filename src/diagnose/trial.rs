@@ -58,6 +58,13 @@ pub(super) struct Trial<'a> {
     pub candidate: Candidate,
 }
 
+impl Trial<'_> {
+    /// Name and scans of its effect, which all members of a family share.
+    fn key(&self) -> (&'static str, Vec<u16>) {
+        (self.candidate.name, self.candidate.scans.clone())
+    }
+}
+
 /// Where a fit begins.
 #[derive(Clone)]
 struct Start {
@@ -88,8 +95,10 @@ impl<'p> Search<'p> {
     ) -> Vec<Trial<'a>> {
         (self.notify)(&format!("round {round}: screening {} effects", effects.len()));
         let screen = self.screen(state);
-        let absent: Vec<_> =
-            effects.iter().filter(|effect| !state.space.has(effect.name())).collect();
+        let absent: Vec<_> = effects
+            .iter()
+            .filter(|effect| !state.space.has(effect.name(), effect.scans()))
+            .collect();
         let mut trials: Vec<Trial> = absent
             .into_par_iter()
             .filter_map(|effect| self.promise(state, &screen, *effect, round))
@@ -143,10 +152,10 @@ impl<'p> Search<'p> {
     /// all shots do not.
     fn refit_shortlist(&self, state: &State, trials: &mut [Trial], round: usize, hopeless: f64) {
         let mut best = 0.5 * self.scorer.settings.least_gain_of(1, 1) / SHARE_OF_BEST;
-        let mut kept: Vec<&str> = Vec::new();
+        let mut kept: Vec<(&str, Vec<u16>)> = Vec::new();
         for trial in trials {
             let promised = trial.candidate.gain;
-            let is_full = kept.len() == SHORTLIST && !kept.contains(&trial.candidate.name);
+            let is_full = kept.len() == SHORTLIST && !kept.contains(&trial.key());
             if promised < hopeless.max(SHARE_OF_BEST * best) {
                 break;
             }
@@ -156,10 +165,8 @@ impl<'p> Search<'p> {
             (self.notify)(&format!("round {round}: refitting with {}", trial.effect.name()));
             self.refit(state, trial);
             best = best.max(trial.candidate.gain);
-            if trial.candidate.gain >= SHARE_OF_PROMISE * promised
-                && !kept.contains(&trial.candidate.name)
-            {
-                kept.push(trial.candidate.name);
+            if trial.candidate.gain >= SHARE_OF_PROMISE * promised && !kept.contains(&trial.key()) {
+                kept.push(trial.key());
             }
         }
     }
@@ -174,7 +181,7 @@ impl<'p> Search<'p> {
     ) -> Option<Trial<'a>> {
         let space = state.space.with(effect);
         let problem = &self.scorer.problem;
-        let values = effect.starts(problem.stage, problem.shots);
+        let values = problem.starts(effect);
         let mut starts = self.promising_starts(state, screen, &space, effect, &values);
         for start in &mut starts {
             self.improve(screen, &space, effect, start);
@@ -197,7 +204,7 @@ impl<'p> Search<'p> {
         }
         let Start { worth, at } = starts.first()?.clone();
         let gain = if is_absent { f64::INFINITY } else { worth };
-        let candidate = Candidate::sampled(round, effect.name(), effect.parameters().len(), gain);
+        let candidate = Candidate::sampled(round, effect, gain);
         let fit = Fit { at, ln_likelihood: f64::NEG_INFINITY, converged: false, is_stuck: false };
         let (tried, size) = (values.len(), Size::default());
         Some(Trial { effect, space, starts, has_far_start, tried, fit, size, candidate })

@@ -69,6 +69,11 @@ pub trait Effect: Sync {
     /// such as places over the target.
     fn starts(&self, stage: &Stage, shots: &[Shot]) -> Vec<Vec<f64>>;
 
+    /// Numbers of the scans on which it acts, of several that are diagnosed together; empty for an effect on all.
+    fn scans(&self) -> &[u16] {
+        &[]
+    }
+
     /// Whether it depends on the time of a chirp.
     fn depends_on_time(&self) -> bool {
         false

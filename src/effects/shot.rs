@@ -13,6 +13,8 @@ const NO_FACET: u32 = u32::MAX;
 /// One chirp and its intersection with the target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shot {
+    /// Number of its scan, from 0: of several scans that are diagnosed together.
+    pub scan: u16,
     /// Chirp number.
     pub chirp: u32,
     /// Time of the chirp, s.
@@ -45,6 +47,7 @@ impl Shot {
     pub(crate) fn missed(chirps: &Chirps, index: usize, progress: f64) -> Shot {
         let ray = chirps.rays[index];
         Shot {
+            scan: 0,
             chirp: chirps.number[index],
             time_s: chirps.time_s.get(index).copied().unwrap_or(0.0),
             progress,

@@ -94,6 +94,11 @@ fn would_help(error: &DiagnoseError) -> &'static str {
              scene, and powers in dBm at the receiver."
         }
         DiagnoseError::Repeated { .. } => "One detection of each chirp, such as the strongest.",
+        DiagnoseError::Contradiction { .. } => "A diagnosis of each cloud alone.",
+        DiagnoseError::OtherTarget { .. } => "Scenes of the same meshes, each where it stood.",
+        DiagnoseError::OtherReceiver { .. } => {
+            "Clouds of receivers of the same noise, speckle and threshold."
+        }
         DiagnoseError::Untimed { .. } => {
             "The time of every chirp, as column `time_s` of the file under [radar.scan]."
         }

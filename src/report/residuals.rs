@@ -28,8 +28,12 @@ const COLUMNS: [&str; 17] = [
 
 /// The chirps of a cloud as the bytes of a file; a cell is empty where nothing was detected.
 pub(super) fn of_cloud(rows: &[Row]) -> Vec<u8> {
-    let mut text = COLUMNS.join(",") + "\n";
+    let has_several = rows.iter().any(|row| row.scan > 0);
+    let mut text = if has_several { "cloud," } else { "" }.to_owned() + &COLUMNS.join(",") + "\n";
     for row in rows {
+        if has_several {
+            text += &format!("{},", row.scan + 1);
+        }
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,

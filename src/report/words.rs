@@ -1,6 +1,8 @@
 //! What a diagnosis found in words, for the terminal and for the page.
 
-use crate::diagnose::{FoundEffect, MAY_BE, Parameters, Report, Triple, Value, Verdict};
+use crate::diagnose::{
+    Contradiction, FoundEffect, MAY_BE, Parameters, Report, Triple, Value, Verdict,
+};
 use crate::effects::{Level, find};
 use crate::formats::words::{digits, in_unit, listed, plus_minus};
 
@@ -20,6 +22,7 @@ pub(super) fn verdict(verdict: Verdict) -> &'static str {
         Verdict::NoMissingEffect => "nothing is missing",
         Verdict::Explained => "explained",
         Verdict::Unexplained => "unexplained",
+        Verdict::Contradictory => "the clouds contradict each other",
     }
 }
 
@@ -30,6 +33,7 @@ pub(super) fn heading(verdict: Verdict, effects: usize) -> &'static str {
         (Verdict::Explained, 2..) => "The missing effects are found",
         (Verdict::Explained, _) => "The missing effect is found",
         (Verdict::Unexplained, _) => "Something unknown remains",
+        (Verdict::Contradictory, _) => "The clouds contradict each other",
     }
 }
 
@@ -40,12 +44,17 @@ pub(super) fn others(class: &[&'static str], name: &str) -> Vec<&'static str> {
 
 /// The verdict in a sentence.
 pub(super) fn sentence(report: &Report) -> String {
-    let names: Vec<&str> = report.effects.iter().map(|found| found.name).collect();
+    let names: Vec<String> =
+        report.effects.iter().map(|found| named(found.name, &found.scans, report)).collect();
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let (effects, with) = match names.len() {
         1 => ("effect", "with it"),
         _ => ("effects", "with them"),
     };
     let names = listed(&names);
+    if let Some(first) = report.contradictions.first() {
+        return contradiction(first, report);
+    }
     match (report.verdict, report.effects.is_empty()) {
         (Verdict::NoMissingEffect, _) => "The scene's model explains the cloud: no effect that was \
              tried predicts unseen parts of the scan better, and nothing that is tested for remains."
@@ -54,16 +63,41 @@ pub(super) fn sentence(report: &Report) -> String {
             "The scene's model lacks the {effects} {names}: {with} the model predicts unseen parts \
              of the scan better, and nothing that is tested for remains."
         ),
-        (Verdict::Unexplained, true) => {
+        (Verdict::Unexplained | Verdict::Contradictory, true) => {
             "The scene's model does not explain the cloud, and no effect that was tried does: what \
              remains is unknown."
                 .to_owned()
         }
-        (Verdict::Unexplained, false) => format!(
+        (Verdict::Unexplained | Verdict::Contradictory, false) => format!(
             "The scene's model lacks the {effects} {names}, which the data support, and something \
              else remains that no effect that was tried explains."
         ),
     }
+}
+
+/// Why several clouds have no one answer, and the way out.
+fn contradiction(one: &Contradiction, report: &Report) -> String {
+    let Contradiction { cloud, effect, gain, se, size_db } = *one;
+    let name = report.clouds.get(cloud.saturating_sub(1)).map_or("a cloud", |part| &part.name);
+    let gain = plus_minus(gain, se);
+    match effect {
+        None => format!(
+            "The laws that fit all clouds do not fit {name}: laws of its own differ by {size_db:.2} dB and change ln p of \
+             its held-out patches by {gain}; check that its material, its radar and its pose are those of the other \
+             clouds, or diagnose it alone."
+        ),
+        Some(effect) => format!(
+            "The clouds together support {effect}, and {name} excludes it: there ln p of held-out patches changes by \
+             {gain}; check what differs in that scan, or diagnose each cloud alone."
+        ),
+    }
+}
+
+/// The name of an effect, with the clouds on which it acts where these are not all.
+pub(super) fn named(name: &str, scans: &[u16], report: &Report) -> String {
+    let clouds = scans.iter().filter_map(|scan| report.clouds.get(usize::from(*scan)));
+    let clouds: Vec<&str> = clouds.map(|part| part.name.as_str()).collect();
+    if clouds.is_empty() { name.to_owned() } else { format!("{name} in {}", listed(&clouds)) }
 }
 
 /// A number with its standard deviation and its unit.
@@ -154,6 +188,9 @@ pub(super) fn covariate(name: &str) -> (String, &'static str) {
         "progress" => ("time", "Something changed while the scan ran."),
         "predicted power" => ("predicted power", "The receiver is not linear, or noise is added."),
         "region" => ("region", "A region has another material than declared."),
+        "cloud" => {
+            ("the cloud", "The clouds differ in their level or in something that no effect has.")
+        }
         "map" => ("place on the target", "Something stands at one place and not at others."),
         "bearing from centre" => {
             ("bearing from the middle of the target", "The beam or the antenna is lopsided.")

@@ -21,6 +21,8 @@ use std::path::Path;
 use super::json::json_file;
 use super::picture::Picture;
 use super::residuals;
+use super::words::sentence;
+use crate::diagnose::Verdict;
 use crate::error::Error;
 use places::Peak;
 
@@ -72,6 +74,12 @@ impl<'a> CloudReport<'a> {
     /// What `report.json` holds.
     pub fn record(&self) -> CloudRecord<'_> {
         CloudRecord::new(self.answer.report, self.answer.not_tried)
+    }
+
+    /// Why several clouds contradict each other, in a sentence; none where they do not.
+    pub fn contradiction(&self) -> Option<String> {
+        let report = self.answer.report;
+        (report.verdict == Verdict::Contradictory).then(|| sentence(report))
     }
 
     /// The diagnosis for the terminal; `files` are the names of those that were written to `folder`.

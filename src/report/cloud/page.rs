@@ -7,6 +7,7 @@ use super::places::{self, Peak};
 use super::record::BaseRecord;
 use crate::diagnose::{BaseValue, Candidate, Control, Controls, Evidence, MeshPose, Report};
 use crate::error::Error;
+use crate::formats::words::listed;
 use crate::report::choice::{Omission, left_out};
 use crate::report::effect::{Article, of_cloud};
 use crate::report::picture::{Figure, Picture};
@@ -79,7 +80,7 @@ pub(super) fn page(
         base: BaseRecord::new(&report.base),
         scene: &scene.file.name,
         scene_path: answer.scene_path.display().to_string(),
-        cloud_path: answer.cloud_path.display().to_string(),
+        cloud_path: clouds(answer),
         heading: heading(report.verdict, report.effects.len()),
         sentence: sentence(report),
         shots: report.rows.len(),
@@ -99,6 +100,12 @@ pub(super) fn page(
         next,
     };
     templates::page("cloud.html", &context)
+}
+
+/// The names of the clouds.
+fn clouds(answer: CloudAnswer) -> String {
+    let names: Vec<&str> = answer.report.clouds.iter().map(|part| part.name.as_str()).collect();
+    if names.is_empty() { answer.cloud_path.display().to_string() } else { listed(&names) }
 }
 
 fn unexplained(report: &Report) -> Vec<Remaining> {

@@ -12,6 +12,7 @@ pub(super) fn square(unknown_db: impl Fn(f64, f64) -> f64) -> Vec<Row> {
 /// A shot with usual values.
 pub(super) fn row() -> Row {
     Row {
+        scan: 0,
         chirp: 0,
         observed_w: Some(1e-9),
         before_w: 1e-9,

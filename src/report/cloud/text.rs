@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use super::places::{self, Peak};
-use crate::diagnose::{Errors, FalseAlarms, FoundEffect, Report};
+use crate::diagnose::{CloudPart, Errors, FalseAlarms, FoundEffect, Report};
 use crate::formats::words::{listed, plus_minus, uncapitalised};
-use crate::report::words::{covariate, gone, numbers, others, sentence, summary, verdict};
+use crate::report::words::{covariate, gone, named, numbers, others, sentence, summary, verdict};
 
 /// Lines of what remains that are shown; the page has all.
 const MOST_UNEXPLAINED: usize = 3;
@@ -14,14 +14,17 @@ const MOST_UNEXPLAINED: usize = 3;
 pub(super) fn text(report: &Report, peaks: &[Peak], files: &[String], folder: &Path) -> String {
     let mut text = format!("{}: {}\n", verdict(report.verdict), uncapitalised(&sentence(report)));
     for found in &report.effects {
-        text += &effect(found);
+        text += &effect(found, report);
     }
     text += &error(report);
     text += &remains(report);
     if let Some(places) = places::words(peaks) {
         text += &format!("  {places}\n");
     }
-    if let Some(level_db) = &report.base.level_db {
+    for part in &report.clouds {
+        text += &cloud(part);
+    }
+    if let Some(level_db) = report.base.level_db.as_ref().filter(|_| report.clouds.is_empty()) {
         text += &format!(
             "level of the radar: {} dB over its settings, {}\n",
             plus_minus(level_db.value, level_db.sd.unwrap_or(f64::INFINITY)),
@@ -45,6 +48,7 @@ pub(super) fn text(report: &Report, peaks: &[Peak], files: &[String], folder: &P
     }
     let mut not_found: Vec<&str> = report.not_found().map(|tried| tried.name).collect();
     not_found.sort_unstable();
+    not_found.dedup();
     if !not_found.is_empty() {
         text += &format!("tried and not supported: {}\n", listed(&not_found));
     }
@@ -73,18 +77,37 @@ fn false_alarms(alarms: &FalseAlarms) -> String {
     }
 }
 
-fn effect(found: &FoundEffect) -> String {
+/// What one of several clouds has.
+fn cloud(part: &CloudPart) -> String {
+    let CloudPart { name, chirps, detected, level_db, before, after } = part;
+    let mut text = format!("{name}: {chirps} chirps on the target, {detected} detected, ");
+    if let Some(level_db) = level_db {
+        let sd = level_db.sd.unwrap_or(f64::INFINITY);
+        text += &format!("level {} dB, ", plus_minus(level_db.value, sd));
+    }
+    text + &format!("{} → {} dB rms\n", rms(before), rms(after))
+}
+
+fn effect(found: &FoundEffect, report: &Report) -> String {
     let values = summary(found).unwrap_or_else(|| {
         let numbers = numbers(&found.parameters);
         numbers.iter().map(|number| number.join(" = ")).collect::<Vec<_>>().join(", ")
     });
     let mut text = format!(
         "  {} ({}): {values}\n    held-out gain in ln p {}, changes the data by {:.2} dB\n",
-        found.name,
+        named(found.name, &found.scans, report),
         found.level.as_str(),
         plus_minus(found.evidence.held_out_gain, found.evidence.held_out_se),
         found.evidence.size_db
     );
+    let gains = found.evidence.by_cloud.iter().filter_map(|one| {
+        let part = report.clouds.get(one.cloud.checked_sub(1)?)?;
+        Some(format!("{} in {}", plus_minus(one.gain, one.se), part.name))
+    });
+    let gains: Vec<String> = gains.collect();
+    if !gains.is_empty() {
+        text += &format!("    of that {}\n", gains.join(", "));
+    }
     let others = others(&found.class, found.name);
     if !others.is_empty() {
         text += &format!("    these data cannot tell it from {}\n", listed(&others));

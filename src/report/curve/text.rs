@@ -20,11 +20,11 @@ pub(super) fn sentence(report: &CurveReport) -> String {
         (Verdict::Explained, _) => {
             format!("the law lacks {names}; with that, what is left is noise")
         }
-        (Verdict::Unexplained, false) => format!(
+        (Verdict::Unexplained | Verdict::Contradictory, false) => format!(
             "the law lacks {names}, which the curve supports, and something unknown remains that no \
              effect that was tried explains"
         ),
-        (Verdict::Unexplained, true) => {
+        (Verdict::Unexplained | Verdict::Contradictory, true) => {
             "the law does not explain the curve, and no effect that was tried does: what remains is \
              unknown"
                 .to_owned()
