@@ -509,3 +509,74 @@ fn a_scan_without_times_is_diagnosed_without_what_goes_with_time() {
     let said = refused(matdb(at).args(all));
     assert!(said.contains("pose cannot be identified from powers alone"), "{said}");
 }
+
+/// A second pose of the target and a second radar, 2 dB stronger than its scene says.
+#[test]
+fn two_clouds_of_one_target_have_one_answer() {
+    let folder = rendered("4");
+    let turned = |text: &str| {
+        let text =
+            text.replace("translation_m = [0.0, 1.25, 0.0]", "translation_m = [0.02, 1.25, 0.0]");
+        let text =
+            text.replace("translation_m = [0.0, 0.83, 0.0]", "translation_m = [0.02, 0.83, 0.0]");
+        text.replace("[radar]\n", "[radar]\ntransmit_power_dbm = 9.0\n")
+            .replace("seed = 3", "seed = 4")
+    };
+    let stronger = turned(SCENE).replace("[radar]\n", "[radar]\nsystem_loss_db = 10.5\n");
+    fs::write(folder.path().join("second.toml"), turned(SCENE)).unwrap();
+    fs::write(folder.path().join("stronger.toml"), stronger).unwrap();
+    let matdb = || matdb(folder.path());
+    matdb().args(["render", "-q", "stronger.toml", "-o", "out2"]).assert().success();
+    let both = [
+        "diagnose",
+        "out/cloud.ply",
+        "out2/cloud.ply",
+        "--effects",
+        "fov-gain,drift",
+        "-o",
+        "report",
+    ];
+    let scenes = ["--scene", "scene.toml", "--scene", "second.toml"];
+    matdb().args(both).args(scenes).assert().success();
+    let report = json(&folder.path().join("report/report.json"));
+    assert_eq!(report["verdict"], "no-missing-effect", "{report:#}");
+    assert_eq!(report["clouds"][1]["name"], "out2/cloud.ply");
+    let [a_db, b_db] = [0, 1].map(|cloud| number(&report["clouds"][cloud]["level_db"]["value"]));
+    assert!((b_db - a_db - 2.0).abs() < 0.4, "{a_db} {b_db}");
+    let csv = fs::read_to_string(folder.path().join("report/residuals.csv")).unwrap();
+    let clouds = column(&csv, "cloud");
+    for cloud in [1.0, 2.0] {
+        let rows = clouds.iter().filter(|one| **one == Some(cloud)).count();
+        assert_eq!(rows as f64, number(&report["clouds"][cloud as usize - 1]["chirps"]));
+    }
+    let page = page(&folder.path().join("report/report.html"));
+    assert!(page.contains("The clouds") && page.contains("out2/cloud.ply"));
+    for name in ["after.toml", "after-2.toml"] {
+        assert!(folder.path().join("report").join(name).is_file(), "{name}");
+    }
+    // What cannot be one diagnosis is said before it starts.
+    let other = turned(SCENE).replace("mannequin-paint", "ptfe");
+    fs::write(folder.path().join("other.toml"), other).unwrap();
+    for (arguments, expected) in [
+        (
+            &[
+                "out2/cloud.ply",
+                "--scene",
+                "scene.toml",
+                "--scene",
+                "second.toml",
+                "--scene",
+                "second.toml",
+            ][..],
+            "2 clouds have 3 scenes",
+        ),
+        (&["out2/cloud.ply", "--scene", "scene.toml", "--scene", "other.toml"], "is of `ptfe`"),
+        (&["out/cloud.ply", "--scene", "scene.toml"], "is given twice"),
+        (&["./out/cloud.ply", "--scene", "scene.toml"], "is given twice"),
+    ] {
+        let message =
+            refused(matdb().args(["diagnose", "out/cloud.ply", "-o", "refused"]).args(arguments));
+        assert!(message.contains(expected), "{message}");
+    }
+    assert!(!folder.path().join("refused").exists());
+}

@@ -113,7 +113,8 @@ fn names(folder: &Path) -> Vec<String> {
     let mut names: Vec<String> = tables().filter(|name| is_file(&folder.join(name))).collect();
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
         let Ok(name) = entry.file_name().into_string() else { continue };
-        let is_input = name == AFTER || (name.starts_with("material-") && name.ends_with(".toml"));
+        let is_scene = name == AFTER || name.starts_with("after-");
+        let is_input = (is_scene || name.starts_with("material-")) && name.ends_with(".toml");
         // Scenes and materials may be somebody's own of the same name.
         let path = folder.join(&name);
         if is_input && is_file(&path) && is_ours(&path) {

@@ -33,7 +33,10 @@ pub(super) fn findings(
     }
     blank.verdict = FindingVerdict::NotFound;
     for candidate in report.not_found() {
-        findings.push(not_found(candidate, blank.clone()));
+        // Of several clouds one effect may be tried for each.
+        if findings.iter().all(|known| known.effect != candidate.name) {
+            findings.push(not_found(candidate, blank.clone()));
+        }
     }
     blank.verdict = FindingVerdict::Unexplained;
     for trend in &report.unexplained {

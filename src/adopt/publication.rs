@@ -1,17 +1,20 @@
 //! Everything that a diagnosis leaves behind: the report, the scene with what was found, and files or stored
 //! revisions of the materials that receive it.
 
+use std::path::Path;
+
 use super::provenance::activity;
 use super::recipients::{Adoption, Recipient, pinned_name, replaced_name};
 use super::request::{CheckedRequest, material_file};
-use super::scene_after::{AFTER, MARK, name_beside, relocate_files, scene_with_found};
-use crate::diagnose::{LEAST_SHOTS, Report};
+use super::scene_after::{AFTER, MARK, after_of, name_beside, relocate_files, scene_with_found};
+use crate::diagnose::{FoundEffect, LEAST_SHOTS, Report, Verdict};
 use crate::effects::Level;
 use crate::error::Error;
+use crate::files::folder_of;
 use crate::formats::words::listed;
 use crate::material::{Activity, Material, file};
 use crate::report::{CloudAnswer, CloudReport, NextSteps, shell_word};
-use crate::scene::SceneFile;
+use crate::scene::{Scene, SceneFile};
 use crate::store::{Addition, Store};
 
 /// First line of a material's file.
@@ -19,6 +22,18 @@ const FOUND: &str = "# A material with what `matdb diagnose` found in it.\n";
 
 /// Name and bytes of a file.
 type File = (String, Vec<u8>);
+
+/// A folder, and the files for it.
+type Beside<'a> = (&'a Path, Vec<File>);
+
+/// A scene of a diagnosis.
+struct DiagnosedScene<'a> {
+    scene: &'a Scene,
+    path: &'a Path,
+    text: &'a str,
+    /// Its clouds, from 0.
+    clouds: Vec<u16>,
+}
 
 /// A diagnosis with everything that its files are made of.
 pub struct Publication<'a> {
@@ -68,7 +83,9 @@ impl<'a> Publication<'a> {
             scene_beside: shell_word(&beside),
             ..NextSteps::default()
         };
-        let recipients = adoption.recipients();
+        // Nothing is stored of clouds that contradict each other.
+        let is_answer = report.verdict != Verdict::Contradictory;
+        let recipients = if is_answer { adoption.recipients() } else { Vec::new() };
         Publication { checked, adoption, recipients, report: CloudReport::new(answer), next }
     }
 
@@ -83,6 +100,11 @@ impl<'a> Publication<'a> {
     /// A picture, page or material that cannot be written.
     pub fn files(&self) -> Result<Vec<(String, Vec<u8>)>, Error> {
         let mut files = self.report.tables_and_pictures()?;
+        if self.adoption.report.verdict == Verdict::Contradictory {
+            files.push(("report.html".to_owned(), self.report.page(&self.next)?));
+            files.sort_by_key(|(name, _)| name != "report.html");
+            return Ok(files);
+        }
         let (mut next, mut names) = (self.next.clone(), Vec::new());
         let mut material_files = Vec::new();
         for recipient in &self.recipients {
@@ -95,7 +117,7 @@ impl<'a> Publication<'a> {
             material_files.push(name);
         }
         let names = self.adoption.region_names(&self.recipients, &names);
-        files.push((AFTER.to_owned(), self.scene_after(&names, &head(&material_files))?));
+        files.extend(self.scenes_after(&names, &head(&material_files))?);
         files.push(("report.html".to_owned(), self.report.page(&next)?));
         files.sort_by_key(|(name, _)| name != "report.html");
         Ok(files)
@@ -109,7 +131,7 @@ impl<'a> Publication<'a> {
     pub fn store<Written>(
         &self,
         store: &mut Store,
-        write: impl FnOnce(&[File], &[File]) -> Result<Written, Error>,
+        write: impl FnOnce(&[File], &[Beside]) -> Result<Written, Error>,
     ) -> Result<(PublicationResult, Written), Error> {
         if self.adoption.report.effects.is_empty() {
             self.store_not_found(store, write)
@@ -121,7 +143,7 @@ impl<'a> Publication<'a> {
     fn store_found<Written>(
         &self,
         store: &mut Store,
-        write: impl FnOnce(&[File], &[File]) -> Result<Written, Error>,
+        write: impl FnOnce(&[File], &[Beside]) -> Result<Written, Error>,
     ) -> Result<(PublicationResult, Written), Error> {
         let mut files = self.report.tables_and_pictures()?;
         let activity = self.activity()?;
@@ -144,11 +166,15 @@ impl<'a> Publication<'a> {
                 ..self.next.clone()
             };
             let names = self.adoption.region_names(&self.recipients, &published.stored);
-            files.push((AFTER.to_owned(), self.scene_after(&names, MARK)?));
+            files.extend(self.scenes_after(&names, MARK)?);
             files.push(("report.html".to_owned(), self.report.page(&next)?));
             files.sort_by_key(|(name, _)| name != "report.html");
-            let beside = self.scene_text(MARK, &self.scene_with(&names))?;
-            write(&files, &[(name_beside(self.checked.request.scene), beside)])
+            let mut beside = Vec::new();
+            for one in self.scenes() {
+                let text = one.text_with(MARK, &self.scene_with(&one, &names))?;
+                beside.push((folder_of(one.path), vec![(name_beside(one.path), text)]));
+            }
+            write(&files, &beside)
         })?;
         for (material, added) in at_places(&materials, &all_added, &last) {
             published.replaced.extend(replaced_name(material, added, store));
@@ -160,7 +186,7 @@ impl<'a> Publication<'a> {
     fn store_not_found<Written>(
         &self,
         store: &mut Store,
-        write: impl FnOnce(&[File], &[File]) -> Result<Written, Error>,
+        write: impl FnOnce(&[File], &[Beside]) -> Result<Written, Error>,
     ) -> Result<(PublicationResult, Written), Error> {
         let mut published =
             PublicationResult { files: self.files()?, ..PublicationResult::default() };
@@ -203,6 +229,7 @@ impl<'a> Publication<'a> {
             ));
         }
         notices.extend(self.unchanged());
+        notices.extend(self.left_out());
         notices
     }
 
@@ -220,27 +247,76 @@ impl<'a> Publication<'a> {
         })
     }
 
-    fn scene_with(&self, materials: &[String]) -> SceneFile {
-        let Report { effects, base, .. } = &self.adoption.report;
-        let level_db = base.level_db.map(|level| level.value);
-        scene_with_found(&self.adoption.ready.scene, effects, level_db, materials)
+    /// Every scene once, with its clouds.
+    fn scenes(&self) -> Vec<DiagnosedScene<'_>> {
+        let CheckedRequest { request, ready, scene_text, further, .. } = self.checked;
+        let first = (&ready.scene, request.scene, scene_text);
+        let others = further.iter().map(|one| (&one.ready.scene, &*one.path, &one.text));
+        let mut scenes: Vec<DiagnosedScene> = Vec::new();
+        for (cloud, (scene, path, text)) in (0..).zip([first].into_iter().chain(others)) {
+            let real = path.canonicalize().ok();
+            let is_it = |known: &&mut DiagnosedScene| known.path.canonicalize().ok() == real;
+            match scenes.iter_mut().find(is_it) {
+                Some(known) => known.clouds.push(cloud),
+                None => scenes.push(DiagnosedScene { scene, path, text, clouds: vec![cloud] }),
+            }
+        }
+        scenes
     }
 
-    /// The scene with what was found, for the folder of the report.
-    fn scene_after(&self, materials: &[String], head: &str) -> Result<Vec<u8>, Error> {
-        let request = &self.checked.request;
-        let file = relocate_files(self.scene_with(materials), request.scene, request.folder)?;
-        self.scene_text(head, &file)
+    /// The effects that a scene can declare: those on all of its clouds. A place on the target is that of the first scene.
+    fn effects_of(&self, one: &DiagnosedScene) -> Vec<FoundEffect> {
+        let is_first = one.clouds.contains(&0);
+        let holds = |found: &&FoundEffect| {
+            let acts = |cloud| found.scans.is_empty() || found.scans.contains(cloud);
+            one.clouds.iter().all(acts) && (is_first || found.place.is_none())
+        };
+        self.adoption.report.effects.iter().filter(holds).cloned().collect()
     }
 
-    fn scene_text(&self, head: &str, file: &SceneFile) -> Result<Vec<u8>, Error> {
-        let text = file.write(&self.checked.scene_text).map_err(|error| {
-            Error::usage(
-                format!("{}: {error}", self.checked.request.scene.display()),
-                "leave the scene as it is while it is diagnosed",
-            )
-        })?;
-        Ok((head.to_owned() + &text).into_bytes())
+    fn scene_with(&self, one: &DiagnosedScene, materials: &[String]) -> SceneFile {
+        let Report { clouds, base, .. } = self.adoption.report;
+        let cloud = one.clouds.first().and_then(|cloud| clouds.get(usize::from(*cloud)));
+        let level_db = cloud.map_or(base.level_db, |part| part.level_db).map(|level| level.value);
+        scene_with_found(one.scene, &self.effects_of(one), level_db, materials)
+    }
+
+    /// The scenes with what was found, for the folder of the report.
+    fn scenes_after(&self, materials: &[String], head: &str) -> Result<Vec<File>, Error> {
+        let mut files = Vec::new();
+        for one in self.scenes() {
+            let file = self.scene_with(&one, materials);
+            let file = relocate_files(file, one.path, self.checked.request.folder)?;
+            let name = match one.clouds[0] {
+                0 => AFTER.to_owned(),
+                number => after_of(usize::from(number)),
+            };
+            files.push((name, one.text_with(head, &file)?));
+        }
+        Ok(files)
+    }
+
+    /// Effects that a scene cannot declare.
+    fn left_out(&self) -> Vec<String> {
+        let mut notices = Vec::new();
+        for one in self.scenes() {
+            let declared = self.effects_of(&one);
+            let is_here = |found: &&FoundEffect| {
+                let acts = |cloud| found.scans.is_empty() || found.scans.contains(cloud);
+                one.clouds.iter().any(acts) && !declared.contains(found)
+            };
+            let left: Vec<&str> =
+                self.adoption.report.effects.iter().filter(is_here).map(|one| one.name).collect();
+            if !left.is_empty() {
+                notices.push(format!(
+                    "the scene after {} lacks {}: not all clouds of the scene have it, or its place is that of the first \
+                     scene",
+                    one.path.display(),
+                    listed(&left)
+                ));
+            }
+        }
+        notices
     }
 
     /// The command and the files that it was given.
@@ -256,6 +332,19 @@ impl<'a> Publication<'a> {
             files.push(format!("{} (BLAKE3 {hash})", input.name));
         }
         format!("Diagnosis of {}, seed {}", files.join(" with "), self.checked.request.seed)
+    }
+}
+
+impl DiagnosedScene<'_> {
+    /// The text of the scene with what was found.
+    fn text_with(&self, head: &str, file: &SceneFile) -> Result<Vec<u8>, Error> {
+        let text = file.write(self.text).map_err(|error| {
+            Error::usage(
+                format!("{}: {error}", self.path.display()),
+                "leave the scene as it is while it is diagnosed",
+            )
+        })?;
+        Ok((head.to_owned() + &text).into_bytes())
     }
 }
 

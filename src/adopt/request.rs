@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::earlier::check_folder;
 use super::recipients::{check_fit_name, find_recipient};
-use super::scene_after::{AFTER, check_beside};
-use crate::diagnose::{DiagnoseError, MeasuredScene, Report, declared_receiver};
+use super::scene_after::{AFTER, after_of, check_beside};
+use crate::diagnose::{DiagnoseError, MeasuredScene, Report, declared_receiver, diagnose_together};
 use crate::effects::{BeamSpot, Effect, MultiBounce, library};
 use crate::error::Error;
 use crate::files::folder_of;
@@ -27,6 +27,8 @@ pub struct CloudRequest<'a> {
     pub cloud: &'a Path,
     /// The scene that was measured.
     pub scene: &'a Path,
+    /// Further clouds of the same target, each with its scene.
+    pub further: &'a [(&'a Path, &'a Path)],
     /// Effects to try; all for an empty list.
     pub effects: &'a [&'static dyn Effect],
     /// The material that alone receives what is found; all of the scene for `None`.
@@ -47,16 +49,49 @@ pub struct CheckedRequest<'a> {
     pub ready: ReadyScene,
     /// Text of the scene file.
     pub scene_text: String,
+    /// The scenes of the further clouds.
+    pub further: Vec<FurtherScene>,
     /// The material that alone receives what is found, as its place among those of the scene.
     pub recipient: Option<usize>,
     /// Effects to try, and the others.
     pub choice: Choice,
 }
 
+/// The scene of a further cloud.
+pub struct FurtherScene {
+    /// Its file.
+    pub path: PathBuf,
+    /// The scene with its materials.
+    pub ready: ReadyScene,
+    /// Text of the scene file.
+    pub text: String,
+}
+
+impl FurtherScene {
+    fn load(path: &Path, store: Option<&Store>) -> Result<FurtherScene, Error> {
+        let text = read_text(path)?;
+        let scene = Scene::load(path)?;
+        check_predicted(&scene, path)?;
+        let ready = ReadyScene::new(scene, path, store)?;
+        Ok(FurtherScene { path: path.to_owned(), ready, text })
+    }
+}
+
 impl<'a> CloudRequest<'a> {
-    /// The files that a user names.
-    pub fn inputs(&self) -> [&'a Path; 2] {
-        [self.cloud, self.scene]
+    /// The clouds' files.
+    pub fn clouds(&self) -> impl Iterator<Item = &'a Path> {
+        [self.cloud].into_iter().chain(self.further.iter().map(|(cloud, _)| *cloud))
+    }
+
+    /// The files that a user names, each once.
+    pub fn inputs(&self) -> Vec<&'a Path> {
+        let mut inputs = vec![self.cloud, self.scene];
+        for path in self.further.iter().flat_map(|(cloud, scene)| [*cloud, *scene]) {
+            if !inputs.contains(&path) {
+                inputs.push(path);
+            }
+        }
+        inputs
     }
 
     /// Loads the scene, with materials from `store` or built in, and checks everything that could hinder the
@@ -70,40 +105,89 @@ impl<'a> CloudRequest<'a> {
         let scene = Scene::load(self.scene)?;
         check_predicted(&scene, self.scene)?;
         let ready = ReadyScene::new(scene, self.scene, store)?;
-        self.check_output(&ready)?;
+        let further = self.further.iter().map(|(_, path)| FurtherScene::load(path, store));
+        let further = further.collect::<Result<Vec<_>, _>>()?;
+        self.check_together(&ready, &further)?;
+        self.check_output(&ready, &further)?;
         let recipient = self.material.map(|name| find_recipient(&ready, name)).transpose()?;
         if self.add {
             check_beside(self.scene)?;
+            further.iter().try_for_each(|scene| check_beside(&scene.path))?;
             check_fit_name(&ready)?;
         }
-        let choice = self.choose_effects(&ready)?;
-        Ok(CheckedRequest { request: self, ready, scene_text, recipient, choice })
+        let scenes: Vec<&ReadyScene> =
+            [&ready].into_iter().chain(further.iter().map(|one| &one.ready)).collect();
+        let choice = self.choose_effects(&scenes)?;
+        Ok(CheckedRequest { request: self, ready, scene_text, further, recipient, choice })
+    }
+
+    /// Checks that several clouds differ and that their scenes have the same regions of the same materials.
+    fn check_together(&self, first: &ReadyScene, further: &[FurtherScene]) -> Result<(), Error> {
+        for (number, cloud) in self.clouds().enumerate() {
+            let real = cloud.canonicalize().ok();
+            if real.is_some()
+                && self.clouds().take(number).any(|other| other.canonicalize().ok() == real)
+            {
+                let problem = format!("the cloud {} is given twice", cloud.display());
+                return Err(Error::usage(problem, "give each cloud once"));
+            }
+        }
+        let regions = &first.scene.target.regions;
+        for other in further {
+            let own = &other.ready.scene.target.regions;
+            let pairs = regions.iter().zip(own);
+            let differs = pairs.clone().find(|(a, b)| a.name != b.name || a.material != b.material);
+            let [path, own_path] = [self.scene, &other.path].map(|path| path.display().to_string());
+            let problem = if let Some((a, b)) = differs {
+                format!(
+                    "region `{}` of {path} is of `{}`, and region `{}` of {own_path} of `{}`",
+                    a.name, a.material, b.name, b.material
+                )
+            } else if regions.len() != own.len() {
+                format!("{path} has {} regions, and {own_path} has {}", regions.len(), own.len())
+            } else {
+                continue;
+            };
+            return Err(Error::usage(
+                problem,
+                "give all scenes the same regions of the same materials, or diagnose the clouds apart",
+            ));
+        }
+        Ok(())
     }
 
     /// Checks that the answer will not replace what is read, or somebody's own scene or material.
-    fn check_output(&self, ready: &ReadyScene) -> Result<(), Error> {
+    fn check_output(&self, ready: &ReadyScene, further: &[FurtherScene]) -> Result<(), Error> {
         let mut written = Vec::new();
         for material in &ready.materials {
             written.push(material_file(&material.name));
         }
         written.push(AFTER.to_owned());
-        let named = named_files(&ready.scene, self.scene);
-        let mut read = self.inputs().to_vec();
+        let mut named = named_files(&ready.scene, self.scene);
+        for (number, other) in further.iter().enumerate() {
+            written.push(after_of(number + 1));
+            named.extend(named_files(&other.ready.scene, &other.path));
+        }
+        let mut read = self.inputs();
         read.extend(named.iter().map(PathBuf::as_path));
         check_folder(self.folder, &read, &written)
     }
 
-    fn choose_effects(&self, ready: &ReadyScene) -> Result<Choice, Error> {
-        let (model, scene) = (ready.model(), &ready.scene);
-        let rendered = Rendered::of(scene);
+    /// The effects to try: those that no scene declares, and that every scan can tell.
+    fn choose_effects(&self, scenes: &[&ReadyScene]) -> Result<Choice, Error> {
         let mut declared = Vec::new();
-        for (effect, _) in model.iter().flat_map(|model| &model.effects) {
-            declared.push(effect.name());
+        let mut measured = Measurands { times: true, ranges: true };
+        for ready in scenes {
+            let (model, scene) = (ready.model(), &ready.scene);
+            let rendered = Rendered::of(scene);
+            for (effect, _) in model.iter().flat_map(|model| &model.effects) {
+                declared.push(effect.name());
+            }
+            declared.extend(rendered.effects().iter().map(|(effect, _)| effect.name()));
+            let (_, of_radar) = declared_receiver(scene.radar());
+            measured.times &= scene.chirps.is_timed();
+            measured.ranges &= of_radar.range_sd_m > 0.0;
         }
-        declared.extend(rendered.effects().iter().map(|(effect, _)| effect.name()));
-        let (_, of_radar) = declared_receiver(scene.radar());
-        let measured =
-            Measurands { times: scene.chirps.is_timed(), ranges: of_radar.range_sd_m > 0.0 };
         let asked =
             if self.effects.is_empty() { library().to_vec() } else { self.effects.to_vec() };
         let choice = Choice::new(&asked, &declared, measured);
@@ -131,33 +215,55 @@ impl<'a> CloudRequest<'a> {
 impl CheckedRequest<'_> {
     /// Sentences on the scene and its materials that the report repeats.
     pub fn notices(&self) -> Vec<String> {
-        let mut notices = self.ready.notices();
+        let mut notices = Vec::new();
+        for notice in self.scenes().flat_map(ReadyScene::notices) {
+            if !notices.contains(&notice) {
+                notices.push(notice);
+            }
+        }
         if self.ready.scene.radar().speckle.is_none() {
             notices.push(NO_SPECKLE.to_owned());
         }
         notices
     }
 
-    /// Diagnoses the cloud; `hear` receives in a few words what is being done.
+    /// The scene of every cloud.
+    pub fn scenes(&self) -> impl Iterator<Item = &ReadyScene> {
+        [&self.ready].into_iter().chain(self.further.iter().map(|one| &one.ready))
+    }
+
+    /// Diagnoses the clouds, one for each scene; `hear` receives in a few words what is being done.
     ///
     /// # Errors
-    /// When the data are too few to tell anything, or are not of this scene.
+    /// When the data are too few to tell anything, or are not of these scenes.
     pub fn diagnose(
         &self,
-        cloud: &Cloud,
+        clouds: &[Cloud],
         hear: &(dyn Fn(&str) + Sync),
     ) -> Result<Report, DiagnoseError> {
-        let (model, rendered) = (self.ready.model(), Rendered::of(&self.ready.scene));
-        let mut declared_effects = rendered.effects();
-        declared_effects.extend(model.iter().flat_map(|model| model.effects.iter().cloned()));
-        let measured = MeasuredScene {
-            scene: &self.ready.scene,
-            cloud,
-            laws: &self.ready.laws(),
-            seen_lobe_rad: &self.ready.seen_lobe_rad(),
-            declared_effects: &declared_effects,
-        };
-        measured.diagnose(self.request.seed, &self.choice.tried, hear)
+        let models: Vec<_> = self.scenes().map(ReadyScene::model).collect();
+        let rendered: Vec<_> = self.scenes().map(|ready| Rendered::of(&ready.scene)).collect();
+        let laws: Vec<_> =
+            self.scenes().map(|ready| (ready.laws(), ready.seen_lobe_rad())).collect();
+        let declared: Vec<Vec<(&dyn Effect, Vec<f64>)>> = std::iter::zip(&models, &rendered)
+            .map(|(model, rendered)| {
+                let mut effects = rendered.effects();
+                effects.extend(model.iter().flat_map(|model| model.effects.iter().cloned()));
+                effects
+            })
+            .collect();
+        let mut measured = Vec::new();
+        for (number, (ready, cloud)) in self.scenes().zip(clouds).enumerate() {
+            let ((laws, seen_lobe_rad), declared_effects) = (&laws[number], &declared[number]);
+            let scene = &ready.scene;
+            measured.push(MeasuredScene { scene, cloud, laws, seen_lobe_rad, declared_effects });
+        }
+        let (seed, effects) = (self.request.seed, &self.choice.tried);
+        let mut report = diagnose_together(&measured, seed, effects, hear)?;
+        for (part, name) in report.clouds.iter_mut().zip(self.request.clouds()) {
+            part.name = name.display().to_string();
+        }
+        Ok(report)
     }
 }
 

@@ -13,6 +13,12 @@ use crate::scene::{Scene, SceneFile};
 /// Name of the scene file with what was found, in the folder of the report.
 pub const AFTER: &str = "after.toml";
 
+/// Name of the scene file of another scene than the first with what was found, in the folder of the report; `number` is
+/// that of its cloud, from 0.
+pub fn after_of(number: usize) -> String {
+    format!("after-{}.toml", number + 1)
+}
+
 /// First line of a scene that a diagnosis wrote when it stored what it found, and may write again.
 pub const MARK: &str = "# Written by `matdb diagnose --add`, which may write it again.\n";
 

@@ -47,6 +47,11 @@ enum Frame {
 impl CloudArgs {
     /// Reads the cloud; `radar` says where its target frame lies.
     pub fn read(&self, radar: &Radar) -> Result<Cloud, Error> {
+        self.read_another(&self.cloud, radar)
+    }
+
+    /// Reads another cloud by the same flags.
+    pub fn read_another(&self, path: &Path, radar: &Radar) -> Result<Cloud, Error> {
         let reading = CloudReading {
             metres_per_unit: match self.unit {
                 LengthUnit::M => 1.0,
@@ -61,7 +66,7 @@ impl CloudArgs {
                 Frame::Target => Some(radar.frames().global_from_target),
             },
         };
-        read_cloud(&self.cloud, &reading)
+        read_cloud(path, &reading)
     }
 }
 

@@ -12,6 +12,7 @@ use crate::cli::cloud::CloudArgs;
   matdb diagnose cloud.ply --scene scene.toml -o diagnosis
   matdb diagnose cloud.ply --scene scene.toml --effects drift,fov-gain -o diagnosis
   matdb diagnose cloud.ply --scene scene.toml -o diagnosis --add    store what is found
+  matdb diagnose a.ply b.ply --scene a.toml --scene b.toml -o diagnosis    one target, two poses
   matdb diagnose --curve coating.csv -o diagnosis
   matdb effects                             what is tried, and its signature
 
@@ -21,9 +22,13 @@ report.json are written, and the status is not 0.")]
 pub struct Args {
     #[command(flatten)]
     pub cloud: Option<CloudArgs>,
-    /// The scene that was measured: its mesh, materials, radar and scan
+    /// Further clouds of the same target: of another pose or antenna, or repeats. One joint answer is found
+    #[arg(value_name = "CLOUD", conflicts_with = "curve")]
+    pub further: Vec<PathBuf>,
+    /// The scene that was measured: its mesh, materials, radar and scan. One for each cloud in the same order, or
+    /// one for all
     #[arg(long, value_name = "SCENE")]
-    pub scene: Option<PathBuf>,
+    pub scene: Vec<PathBuf>,
     /// Instead of a cloud: a backscatter curve (.csv of `matdb measure`), a table in the plane of
     /// incidence (.csv: theta_i_deg,theta_s_deg,brdf_per_sr) or a .bsdf
     #[arg(long, value_name = "FILE")]

@@ -1,7 +1,7 @@
 //! `matdb diagnose CLOUD --scene SCENE`.
 
 use std::ffi::OsString;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::args::Args;
 use super::refusal::write_refusal;
@@ -13,23 +13,29 @@ use crate::cli::console::Console;
 use crate::cli::effects::chosen;
 use crate::diagnose::{DiagnoseError, Report};
 use crate::error::Error;
-use crate::files::{FilesError, Placement, WayOut, folder_of, write_all};
+use crate::files::{FilesError, Placement, WayOut, write_all};
 use crate::formats::words::listed;
 use crate::report::{CannotTell, shell_word};
 use crate::setup::{Database, USUAL_DATABASE};
 
-/// Diagnoses a cloud and writes the answer.
+/// The folder of a scene, and the files for it.
+type Beside<'a> = (&'a Path, Vec<(String, Vec<u8>)>);
+
+/// Diagnoses a cloud, or several of one target together, and writes the answer.
 pub(super) fn run(
     cloud: &CloudArgs,
-    scene: &Path,
     args: &Args,
     db: &Database,
     console: &Console,
 ) -> Result<(), Error> {
+    let scenes = scene_of_each(args)?;
+    let further = args.further.iter().map(|path| path.as_path());
+    let further: Vec<(&Path, &Path)> = further.zip(scenes.iter().skip(1).copied()).collect();
     let effects = if args.effects.is_empty() { Vec::new() } else { chosen(&args.effects)? };
     let request = CloudRequest {
         cloud: &cloud.cloud,
-        scene,
+        scene: scenes[0],
+        further: &further,
         effects: &effects,
         material: args.material.as_deref(),
         seed: args.seed,
@@ -47,7 +53,21 @@ pub(super) fn run(
     }
 }
 
-/// Reads the cloud and diagnoses it, with a sign of life.
+/// The scene of each cloud.
+fn scene_of_each(args: &Args) -> Result<Vec<&Path>, Error> {
+    let clouds = 1 + args.further.len();
+    let scenes: Vec<&Path> = args.scene.iter().map(PathBuf::as_path).collect();
+    match scenes[..] {
+        [one] => Ok(vec![one; clouds]),
+        _ if scenes.len() == clouds => Ok(scenes),
+        _ => Err(Error::usage(
+            format!("{clouds} clouds have {} scenes", scenes.len()),
+            "give --scene once for each cloud, in the same order, or once for all",
+        )),
+    }
+}
+
+/// Reads the clouds and diagnoses them, with a sign of life.
 fn diagnose(
     cloud: &CloudArgs,
     checked: &CheckedRequest,
@@ -57,12 +77,15 @@ fn diagnose(
     for notice in checked.choice.notices() {
         console.notice(&notice);
     }
-    let cloud = cloud.read(checked.ready.scene.radar())?;
-    for notice in cloud.notices.iter().chain(notices) {
+    let mut clouds = Vec::new();
+    for (path, ready) in checked.request.clouds().zip(checked.scenes()) {
+        clouds.push(cloud.read_another(path, ready.scene.radar())?);
+    }
+    for notice in clouds.iter().flat_map(|cloud| &cloud.notices).chain(notices) {
         console.notice(notice);
     }
     let bar = console.spinner("diagnosing");
-    let report = checked.diagnose(&cloud, &|what| bar.set_message(format!("diagnosing: {what}")));
+    let report = checked.diagnose(&clouds, &|what| bar.set_message(format!("diagnosing: {what}")));
     bar.finish_and_clear();
     Ok(report?)
 }
@@ -79,11 +102,13 @@ fn publish(
     let command = command(db, std::env::args_os().skip(1).collect());
     let publication = Publication::new(checked, report, notices, [program(db), command]);
     let earlier = Earlier::in_folder(request.folder, &request.inputs());
-    let published = if request.add {
+    let contradiction = publication.report().contradiction();
+    let published = if request.add && contradiction.is_none() {
         let mut store = db.write()?;
         let (published, written) = publication.store(&mut store, |files, beside| {
-            let folders = [(request.folder, files), (folder_of(request.scene), beside)];
-            Placement::new(&folders).map_err(|error| of_scene(error, request.scene, beside).into())
+            let mut folders = vec![(request.folder, files)];
+            folders.extend(beside.iter().map(|(folder, files)| (*folder, &files[..])));
+            Placement::new(&folders).map_err(|error| beside.iter().fold(error, of_scene).into())
         })?;
         written.keep();
         published
@@ -100,17 +125,21 @@ fn publish(
     }
     let names: Vec<String> = published.files.iter().map(|(name, _)| name.clone()).collect();
     let mut text = publication.report().text(&names, request.folder);
-    if request.add {
+    if request.add && contradiction.is_none() {
         text += &stored(&publication, &published, request, db.path());
     }
-    console.result(&text, &publication.report().record())
+    console.result(&text, &publication.report().record())?;
+    match contradiction {
+        Some(sentence) => Err(DiagnoseError::Contradiction { sentence }.into()),
+        None => Ok(()),
+    }
 }
 
 /// The error of a file; one next to the scene is not in the folder that a person can choose.
-fn of_scene(error: FilesError, scene: &Path, beside: &[(String, Vec<u8>)]) -> FilesError {
-    let is_beside = beside.iter().any(|(name, _)| error.path == folder_of(scene).join(name));
+fn of_scene(error: FilesError, (folder, files): &Beside) -> FilesError {
+    let is_beside = files.iter().any(|(name, _)| error.path == folder.join(name));
     match error.way_out {
-        WayOut::OtherFolder if is_beside || error.path == folder_of(scene) => FilesError {
+        WayOut::OtherFolder if is_beside || error.path == *folder => FilesError {
             way_out: WayOut::Words("make room there, or diagnose a copy of the scene elsewhere"),
             ..error
         },
@@ -121,7 +150,9 @@ fn of_scene(error: FilesError, scene: &Path, beside: &[(String, Vec<u8>)]) -> Fi
 /// Writes why nothing can be said; the error is the way out.
 fn refuse(error: DiagnoseError, request: &CloudRequest, console: &Console) -> Result<(), Error> {
     let answer = CannotTell::of_cloud(&error);
-    let subject = format!("{} with {}", request.cloud.display(), request.scene.display());
+    let names: Vec<String> =
+        request.inputs().iter().map(|path| path.display().to_string()).collect();
+    let subject = names.join(" with ");
     write_refusal(&answer, &subject, request.folder, &request.inputs(), console)?;
     Err(error.into())
 }

@@ -12,9 +12,9 @@ use crate::setup::Database;
 pub(super) use args::Args;
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
-    match (&args.curve, &args.cloud, &args.scene) {
-        (Some(curve), None, None) => curve::run(curve, args, console),
-        (None, Some(cloud), Some(scene)) => cloud::run(cloud, scene, args, db, console),
+    match (&args.curve, &args.cloud, &args.scene[..]) {
+        (Some(curve), None, []) => curve::run(curve, args, console),
+        (None, Some(cloud), [_, ..]) => cloud::run(cloud, args, db, console),
         _ => Err(Error::usage(
             "a diagnosis is of a cloud and its scene, or of a curve",
             "give CLOUD --scene SCENE, or --curve FILE alone",
