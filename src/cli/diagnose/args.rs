@@ -6,7 +6,7 @@ use crate::cli::cloud::CloudArgs;
 
 /// Find the physical effect that a model lacks to explain a measurement
 #[derive(Debug, clap::Args)]
-#[command(mut_arg("cloud", |cloud| cloud.required(false)))]
+#[command(mut_arg("cloud", |cloud| cloud.required(false).index(1)))]
 #[command(mut_args(of_clouds))]
 #[command(after_help = "Examples:
   matdb diagnose cloud.ply --scene scene.toml -o diagnosis
@@ -23,7 +23,7 @@ pub struct Args {
     #[command(flatten)]
     pub cloud: Option<CloudArgs>,
     /// Further clouds of the same target: of another pose or antenna, or repeats. One joint answer is found
-    #[arg(value_name = "CLOUD", conflicts_with = "curve")]
+    #[arg(value_name = "CLOUD", index = 2, conflicts_with = "curve")]
     pub further: Vec<PathBuf>,
     /// The scene that was measured: its mesh, materials, radar and scan. One for each cloud in the same order, or
     /// one for all
