@@ -570,9 +570,9 @@ fn two_clouds_of_one_target_have_one_answer() {
             ][..],
             "2 clouds have 3 scenes",
         ),
-        (&["out2/cloud.ply", "--scene", "scene.toml", "--scene", "other.toml"], "is of `ptfe`"),
-        (&["out/cloud.ply", "--scene", "scene.toml"], "is given twice"),
-        (&["./out/cloud.ply", "--scene", "scene.toml"], "is given twice"),
+        (&["out2/cloud.ply", "--scene", "scene.toml", "--scene", "other.toml"][..], "is of `ptfe`"),
+        (&["out/cloud.ply", "--scene", "scene.toml"][..], "is given twice"),
+        (&["./out/cloud.ply", "--scene", "scene.toml"][..], "is given twice"),
     ] {
         let message =
             refused(matdb().args(["diagnose", "out/cloud.ply", "-o", "refused"]).args(arguments));
