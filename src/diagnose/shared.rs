@@ -340,6 +340,24 @@ mod tests {
     }
 
     #[test]
+    fn shared_speckle_is_no_swing_and_hides_none() {
+        for seed in 0..20 {
+            // A tenth of the scatter is that of each chirp.
+            let (speckle, own) = (field(0.0136, seed), field(0.0, seed + 100));
+            for (amplitude, is_found) in [(0.0, false), (0.5, true)] {
+                let z: Vec<f64> = (0..SIDE * SIDE)
+                    .map(|index| {
+                        let swing = (std::f64::consts::TAU * index as f64 / 310.0).sin();
+                        0.91f64.sqrt() * speckle[index] + 0.3 * own[index] + amplitude * swing
+                    })
+                    .collect();
+                let swing = crate::diagnose::order::swing(&z, &shots(), &found(&z), 2.3);
+                assert_eq!(swing.is_some(), is_found, "{seed}: {swing:?}");
+            }
+        }
+    }
+
+    #[test]
     fn independent_shots_and_what_is_missing_share_no_speckle() {
         assert_eq!(found(&field(0.0, 2)), ALONE);
         // A slope of one and a half standard deviations over the target.
