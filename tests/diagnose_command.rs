@@ -550,7 +550,7 @@ fn two_clouds_of_one_target_have_one_answer() {
         assert_eq!(rows as f64, number(&report["clouds"][cloud as usize - 1]["chirps"]));
     }
     let page = page(&folder.path().join("report/report.html"));
-    assert!(page.contains("The clouds") && page.contains("out2/cloud.ply"));
+    assert!(page.contains("The clouds") && page.contains("out2&#x2f;cloud.ply"));
     for name in ["after.toml", "after-2.toml"] {
         assert!(folder.path().join("report").join(name).is_file(), "{name}");
     }

@@ -5,7 +5,9 @@ use serde::Serialize;
 use super::answer::{CloudAnswer, NextSteps};
 use super::places::{self, Peak};
 use super::record::BaseRecord;
-use crate::diagnose::{BaseValue, Candidate, Control, Controls, Evidence, MeshPose, Report};
+use crate::diagnose::{
+    BaseValue, Candidate, CloudGain, CloudPart, Control, Controls, Evidence, MeshPose, Report,
+};
 use crate::error::Error;
 use crate::formats::words::listed;
 use crate::report::choice::{Omission, left_out};
@@ -32,6 +34,10 @@ struct Page<'a> {
     seed: u64,
     notices: &'a [String],
     effects: Vec<Article<'a, Evidence>>,
+    /// What each of several clouds has; empty for one cloud.
+    clouds: &'a [CloudPart],
+    /// Effect, cloud, and the gain of the one in the other.
+    gains: Vec<(&'static str, &'a str, CloudGain)>,
     /// Share of the squared error above the noise that is gone, in words.
     share: Option<String>,
     pictures: Vec<Figure<'a>>,
@@ -88,6 +94,8 @@ pub(super) fn page(
         seed,
         notices,
         effects: report.effects.iter().map(of_cloud).collect(),
+        clouds: &report.clouds,
+        gains: gains(report),
         share: report.error.explained_share.map(gone),
         pictures: pictures.iter().map(Picture::figure).collect::<Result<_, Error>>()?,
         unexplained: unexplained(report),
@@ -106,6 +114,17 @@ pub(super) fn page(
 fn clouds(answer: CloudAnswer) -> String {
     let names: Vec<&str> = answer.report.clouds.iter().map(|part| part.name.as_str()).collect();
     if names.is_empty() { answer.cloud_path.display().to_string() } else { listed(&names) }
+}
+
+/// The gain of every effect in every one of several clouds.
+fn gains(report: &Report) -> Vec<(&'static str, &str, CloudGain)> {
+    let mut gains = Vec::new();
+    for found in &report.effects {
+        for (part, gain) in report.clouds.iter().zip(&found.evidence.by_cloud) {
+            gains.push((found.name, part.name.as_str(), *gain));
+        }
+    }
+    gains
 }
 
 fn unexplained(report: &Report) -> Vec<Remaining> {
