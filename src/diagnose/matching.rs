@@ -216,11 +216,16 @@ impl Scan<'_> {
         points
     }
 
+    /// The highest power of a false alarm, W.
+    fn most_alarm_w(&self) -> f64 {
+        MOST_OVER_THRESHOLD * self.threshold_w
+    }
+
     /// Whether a detection away from the target may be of noise: on its chirp's ray, at most 6 dB above the threshold, and the only one
     /// that its chirp reports. `spoke`: the chirps that have reported one.
     fn is_alarm(&self, point: &CloudPoint, shot: &Shot, spoke: &mut HashSet<u32>) -> bool {
         off_ray_m(point, &shot.ray).length() <= ON_RAY_M
-            && point.power_w <= MOST_OVER_THRESHOLD * self.threshold_w
+            && point.power_w <= self.most_alarm_w()
             && (spoke.insert(shot.chirp) || self.returns == Returns::All)
     }
 
@@ -253,6 +258,10 @@ impl Scan<'_> {
                 if is_near && is_first {
                     on_target += 1;
                     *observation = Observation::detected(point.power_w, Some(range_m));
+                    // Noise hardly ever reaches more.
+                    if self.returns == Returns::Strongest && point.power_w <= self.most_alarm_w() {
+                        alarms.stronger_w.push(point.power_w);
+                    }
                 } else if (!is_near || self.returns == Returns::All)
                     && self.is_alarm(point, shot, &mut spoke)
                 {

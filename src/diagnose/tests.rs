@@ -15,8 +15,7 @@ use super::trial::Search;
 use super::*;
 use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Shadowing};
 use crate::effects::{
-    About, Effect, EffectParameter, Level, Model, Place, PredictionCache, Receiver, Shot, Stage,
-    find,
+    About, Effect, EffectParameter, Level, Model, Place, Receiver, Shot, Stage, find,
 };
 use crate::frames::{Global, Point, Pose, Ray};
 use crate::geometry::Mesh;
@@ -213,19 +212,18 @@ pub(super) fn searched(
     check: &dyn Fn(&Search, Space),
 ) {
     let bench = Bench::new(target());
-    let stage = &bench.stage();
-    let shots = &trace_shots(stage).unwrap()[..];
-    let observations = &observed(stage, shots, vec![(effect, vec![value])], settings.seed)[..];
+    let stages = [bench.stage()];
+    let views = &views::Views::new(&stages).unwrap();
+    let shots = &trace_shots(&stages[0]).unwrap()[..];
+    let observations = &observed(&stages[0], shots, vec![(effect, vec![value])], settings.seed)[..];
     let (receiver, declared, laws) = (receiver(), declared(), [near_law()]);
-    let (alarms, shared) = (&Alarms::default(), &ALONE);
-    let traced = &PredictionCache::default();
+    let (alarms, shared, traced) = (&[Alarms::default()][..], &ALONE, &problem::caches(1)[..]);
     let problem =
-        Problem { stage, shots, observations, declared, receiver, alarms, shared, traced };
+        Problem { views, shots, observations, declared, receiver, alarms, shared, traced };
     let Diagnosis { block_m, folds, seed, .. } = *settings;
     let folds = &Folds::new(shots, block_m, folds, seed);
     let (scorer, sample) = (Scorer { problem, folds, settings }, &Sample::new(&problem, ENOUGH));
-    let mut space = Space::new(shots, receiver.looks, &laws, &[]).unwrap();
-    space.ln_level = Some(problem.ln_level(&space));
+    let space = problem.with_levels(Space::new(shots, receiver.looks, &laws, &[]).unwrap());
     check(&Search { scorer, sample, notify: &|_| () }, space);
 }
 
@@ -734,17 +732,13 @@ impl Part {
             let range_m = arrived.range_m + RANGE_SD_M * draws.gaussian();
             let is_seen = power_w >= THRESHOLD_W;
             seen.push(if is_seen {
-                Observation { power_w: Some(power_w), range_m: Some(range_m) }
+                Observation::detected(power_w, Some(range_m))
             } else {
                 Observation::default()
             });
         }
         seen
     }
-}
-
-fn receiver() -> Receiver {
-    Receiver { looks: 4.0, noise_w: watts_from_dbm(-100.0), ..Receiver::LINEAR }
 }
 
 /// The joint report on some scans, by a model of one region.
