@@ -38,6 +38,8 @@ const MOST_NUMBERS_FAR: usize = 5;
 const SHORTLIST: usize = 5;
 /// An effect that gains less than this share of the best is not among them.
 const SHARE_OF_BEST: f64 = 0.3;
+/// An effect that gains less than this share of its least gain on the sample is not fitted to all shots.
+const SHARE_OF_LEAST: f64 = 0.5;
 /// A refit that keeps less than this share of its promise does not count among them.
 const SHARE_OF_PROMISE: f64 = 0.3;
 /// An effect that gains less than this share of what it needs beside the effects already added is not searched for
@@ -151,7 +153,8 @@ impl<'p> Search<'p> {
     /// Fits the best few trials to all shots. They are compared with what the refits keep: a sample may promise what
     /// all shots do not.
     fn refit_shortlist(&self, state: &State, trials: &mut [Trial], round: usize, hopeless: f64) {
-        let mut best = 0.5 * self.scorer.settings.least_gain_of(1, 1) / SHARE_OF_BEST;
+        let settings = self.scorer.settings;
+        let mut best = SHARE_OF_LEAST * settings.least_gain_of(1, 1) / SHARE_OF_BEST;
         let mut kept: Vec<(&str, Vec<u16>)> = Vec::new();
         for trial in trials {
             let promised = trial.candidate.gain;
@@ -159,7 +162,8 @@ impl<'p> Search<'p> {
             if promised < hopeless.max(SHARE_OF_BEST * best) {
                 break;
             }
-            if is_full {
+            let least = settings.least_gain_of(trial.candidate.numbers, trial.tried);
+            if is_full || promised < SHARE_OF_LEAST * least {
                 continue;
             }
             (self.notify)(&format!("round {round}: refitting with {}", trial.effect.name()));
