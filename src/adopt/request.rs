@@ -140,7 +140,7 @@ impl<'a> CloudRequest<'a> {
             let [path, own_path] = [self.scene, &other.path].map(|path| path.display().to_string());
             let problem = if let Some((a, b)) = differs {
                 format!(
-                    "region `{}` of {path} is of `{}`, and region `{}` of {own_path} of `{}`",
+                    "region `{}` is of `{}` in {path}, and region `{}` is of `{}` in {own_path}",
                     a.name, a.material, b.name, b.material
                 )
             } else if regions.len() != own.len() {
