@@ -99,7 +99,7 @@ impl Gain {
 
 pub(super) static BOWL: Gain =
     Gain::new("bowl", |shot| (shot.xt_m.powi(2) + shot.yt_m.powi(2)) / 0.25);
-pub(super) static DRIFT: Gain = Gain::new("drift", |shot| shot.progress - 0.5);
+pub(super) static DRIFT: Gain = Gain::new("trend", |shot| shot.progress - 0.5);
 static SLANT: Gain = Gain::new("slant", |shot| shot.xt_m);
 /// A slant with a step, and the step where it is in the middle rows alone.
 static BENT: Gain = Gain::new("bent", |shot| shot.xt_m + 0.1 * shot.xt_m.signum());
@@ -322,7 +322,7 @@ fn two_missing_effects_are_both_found() {
     let report = diagnosed(&[(&BOWL, 2.5), (&DRIFT, -3.0)], 21);
     let mut names: Vec<&str> = report.effects.iter().map(|e| e.name).collect();
     names.sort_unstable();
-    assert_eq!(names, ["bowl", "drift"], "{report:#?}");
+    assert_eq!(names, ["bowl", "trend"], "{report:#?}");
 }
 
 #[test]
@@ -335,7 +335,7 @@ fn a_weak_effect_beside_a_strong_one_gets_no_name() {
     assert!((hidden.strength_db - 0.43).abs() < 0.15 && hidden.p_value < 1e-3, "{hidden:?}");
     // Alone it has a name.
     let report = diagnosed(&[(&DRIFT, 1.5)], 7);
-    assert_eq!(report.effects.first().map(|e| e.name), Some("drift"), "{report:#?}");
+    assert_eq!(report.effects.first().map(|e| e.name), Some("trend"), "{report:#?}");
 }
 
 #[test]
@@ -799,7 +799,7 @@ fn a_drift_of_one_of_two_instruments_is_named_for_that_one() {
     let report = diagnosed_together(&[Part::new(0.0, 7.0, 1), second], &LIBRARY);
     assert_eq!(report.verdict, Verdict::Explained, "{report:#?}");
     let found: Vec<_> = report.effects.iter().map(|one| (one.name, &one.scans[..])).collect();
-    assert_eq!(found, [("drift", &[1u16][..])]);
+    assert_eq!(found, [("trend", &[1u16][..])]);
     let Value { value, sd, .. } = report.effects[0].parameters["edge_db"];
     assert!((value - 3.0).abs() < 4.0 * sd.unwrap(), "{value} {sd:?}");
     let [first, second] = report.effects[0].evidence.by_cloud[..] else { panic!() };
@@ -860,7 +860,7 @@ fn an_effect_that_one_cloud_excludes_is_a_contradiction() {
     let report = diagnosed_together(&[Part::new(0.0, 7.0, 1), second], &LIBRARY);
     assert_eq!(report.verdict, Verdict::Contradictory, "{report:#?}");
     assert!(report.effects.is_empty(), "{:#?}", report.effects);
-    let of_drift = report.contradictions.iter().find(|one| one.effect == Some("drift")).unwrap();
+    let of_drift = report.contradictions.iter().find(|one| one.effect == Some("trend")).unwrap();
     assert_eq!(of_drift.cloud, 1);
 }
 
