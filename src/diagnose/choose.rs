@@ -252,19 +252,11 @@ fn contenders(judge: &Judge, trials: &mut [Trial]) -> Vec<Contender> {
         }
     }
     let cases: Vec<&Trial> = contenders.iter().map(|one| &trials[one.trial]).collect();
-    let is_needless = |one: &&Trial| cases.iter().any(|other| is_enough(other, one));
+    let is_needless = |one: &&Trial| cases.iter().any(|other| other.is_enough_for(one));
     let mut needless = cases.iter().map(is_needless).collect::<Vec<bool>>().into_iter();
     contenders.retain(|_| !needless.next().unwrap_or(false));
     contenders.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     contenders
-}
-
-/// Whether a motion of the target makes another with more parameters needless: each of those must gain 1 in ln p (Akaike,
-/// IEEE Trans. Autom. Control 19, 1974). A pose is the constant case of a motion.
-fn is_enough(simple: &Trial, flexible: &Trial) -> bool {
-    let [few, many] = [simple, flexible].map(|trial| trial.candidate.numbers as f64);
-    let more = flexible.candidate.gain - simple.candidate.gain;
-    simple.effect.moves() && flexible.effect.moves() && few < many && more < many - few
 }
 
 /// Two effects in one fit.

@@ -61,6 +61,18 @@ pub(super) struct Trial<'a> {
 }
 
 impl Trial<'_> {
+    /// Whether this motion of the target makes another with more parameters needless: each of those must gain 1 in ln p
+    /// (Akaike, IEEE Trans. Autom. Control 19, 1974). A pose is the constant case of a motion. Where neither promises
+    /// anything, the simpler one is tried.
+    pub fn is_enough_for(&self, flexible: &Trial) -> bool {
+        let [few, many] = [self, flexible].map(|trial| trial.candidate.numbers as f64);
+        let more = flexible.candidate.gain - self.candidate.gain;
+        let gains_little = more.is_nan() || more < many - few;
+        let move_alike = self.effect.moves() && flexible.effect.moves();
+        let [own, other] = [self, flexible].map(|trial| &trial.candidate.scans);
+        move_alike && own == other && few < many && gains_little
+    }
+
     /// Name and scans of its effect, which all members of a family share.
     fn key(&self) -> (&'static str, Vec<u16>) {
         (self.candidate.name, self.candidate.scans.clone())
@@ -105,6 +117,7 @@ impl<'p> Search<'p> {
             .into_par_iter()
             .filter_map(|effect| self.promise(state, &screen, *effect, round))
             .collect();
+        leave_needless_members(&mut trials);
         sort(&mut trials);
         self.scout_promising(state, &screen, &mut trials, round);
         sort(&mut trials);
@@ -407,6 +420,17 @@ fn of_all_strengths(effect: &dyn Effect, start: &DVector<f64>) -> [DVector<f64>;
         }
         at
     })
+}
+
+/// Leaves out members of motions that promise no more than simpler ones of their family.
+fn leave_needless_members(trials: &mut Vec<Trial>) {
+    let is_needless = |one: &Trial| {
+        let mut family = trials.iter().filter(|other| other.candidate.name == one.candidate.name);
+        family.any(|other| other.is_enough_for(one))
+    };
+    let needless: Vec<bool> = trials.iter().map(is_needless).collect();
+    let mut needless = needless.into_iter();
+    trials.retain(|_| !needless.next().unwrap_or(false));
 }
 
 /// Sorts trials by their gain, best first.
