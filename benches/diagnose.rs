@@ -82,6 +82,7 @@ fn diagnosed(scene: &Path, cloud: &Cloud) -> Result<Report, Failure> {
         seen_lobe_rad: &ready.seen_lobe_rad(),
         scene: &ready.scene,
         cloud,
+        antenna: None,
         laws: &ready.laws(),
         declared_effects: model.as_ref().map_or(&[][..], |model| &model.effects),
     };

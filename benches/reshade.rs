@@ -34,6 +34,7 @@ fn main() {
         grain_of_region: &[DVec3::Y],
         seen_lobe_rad: &[],
         on_wavefront: false,
+        antenna: None,
         middle: DVec3::ZERO,
     };
     let shots = diagnose::trace_shots(&stage).expect("chirps that meet the target");

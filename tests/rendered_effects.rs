@@ -11,10 +11,11 @@ use glam::{DMat3, DVec3};
 use matdb::brdf::Brdf;
 use matdb::diagnose;
 use matdb::effects::{
-    Effect, EffectParameter, Level, Model, Receiver, SceneEffects, Shot, Stage, entry, find,
-    library, middle, resolve,
+    Antenna, Effect, EffectParameter, Level, Model, Receiver, SceneEffects, Setting, Shot, Stage,
+    entry, find, library, middle, resolve,
 };
 use matdb::formats::EffectEntry;
+use matdb::frames::Point;
 use matdb::material::builtin;
 use matdb::radar::Link;
 use matdb::render::{Echo, Observer, RenderError, Setup, Surface, shade, trace_placed};
@@ -69,6 +70,8 @@ struct Bench {
     scene: Scene,
     laws: Vec<Brdf>,
     bvh: Bvh<'static>,
+    /// The antenna that receives the echoes; none for the radar's own.
+    antenna: Option<Antenna>,
 }
 
 impl Bench {
@@ -80,7 +83,7 @@ impl Bench {
         };
         let laws = scene.target.regions.iter().map(law).collect();
         let bvh = Bvh::new(Box::leak(Box::new(scene.target.mesh.clone())));
-        Bench { scene, laws, bvh }
+        Bench { scene, laws, bvh, antenna: None }
     }
 
     fn grains(&self) -> Vec<DVec3> {
@@ -100,6 +103,7 @@ impl Bench {
             grain_of_region: &grains,
             seen_lobe_rad: &[],
             on_wavefront: false,
+            antenna: self.antenna,
             middle: DVec3::ZERO,
         };
         let shots = diagnose::trace_shots(&stage).unwrap();
@@ -118,7 +122,13 @@ impl Bench {
         let paper = Setup::new(self.geometry(), &surfaces);
         let setup = Setup { effects: Some(model), seed: self.scene.file.seed, ..paper };
         let footprints = trace_placed(&setup, rays, &|_| {})?;
-        Ok(shade(&setup, &footprints, Observer::Radar, &|_| {})?.echoes)
+        let observer = match self.antenna {
+            None => Observer::Radar,
+            Some(Antenna { position, aperture_m2 }) => {
+                Observer::Receiver { number: 1, position, aperture_m2 }
+            }
+        };
+        Ok(shade(&setup, &footprints, observer, &|_| {})?.echoes)
     }
 
     fn with(&self, name: &str, values: &[f64]) -> Vec<Echo> {
@@ -187,6 +197,28 @@ fn every_effect_changes_every_echo_as_its_model_predicts() {
             felt += usize::from(bench.render(&bench.model(&effects), 1).unwrap() != bare);
         }
         assert!(felt > 0, "{} changes nothing here", effect.name());
+    }
+}
+
+/// f(i, o), the field that facets turn, the way back past the target, and half of the whole way as the range.
+#[test]
+fn an_antenna_apart_receives_what_the_model_predicts() {
+    let mut bench = Bench::new(SCENE);
+    for (x_m, aperture_m2) in [(-3.0, None), (6.0, Some(0.02))] {
+        bench.antenna = Some(Antenna { position: Point::new(x_m, 1.4, 4.0), aperture_m2 });
+        for effect in library() {
+            let conflicts = effect.about().conflicts;
+            let is_random = ["speckle", "noise-floor"].contains(&effect.name());
+            if is_random || conflicts.iter().any(|one| one.with == Setting::OtherAntenna) {
+                continue;
+            }
+            let starts = bench.with_stage(|stage, shots| effect.starts(stage, shots));
+            let known = starts[0].iter().zip(effect.parameters());
+            let values: Vec<f64> =
+                known.map(|(value, known)| (value + known.step).min(known.max)).collect();
+            let case = format!("{} at {values:?}", effect.name());
+            assert!(agrees(&bench, &one(effect.name(), &values), &case) > 300, "{case}");
+        }
     }
 }
 
@@ -539,7 +571,7 @@ fn mistakes_are_named_with_their_place_and_the_way_out() {
             table("radar.effect", "speckle", "") + "[radar.receiver]\n",
             &["[radar.receiver] averages", "radar.speckle.looks"],
         ),
-        (table("radar.effect", "drift", "") + beside, &["receiver `left`", "another antenna"]),
+        (table("effect", "covering-layer", "") + beside, &["receiver `left`", "another antenna"]),
     ] {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("scene.toml"), SCENE.to_owned() + &more).unwrap();

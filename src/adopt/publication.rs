@@ -6,7 +6,9 @@ use std::path::Path;
 use super::provenance::activity;
 use super::recipients::{Adoption, Recipient, pinned_name, replaced_name};
 use super::request::{CheckedRequest, material_file};
-use super::scene_after::{AFTER, MARK, after_of, name_beside, relocate_files, scene_with_found};
+use super::scene_after::{
+    AFTER, MARK, after_of, name_beside, of_own_echoes, relocate_files, scene_with_found,
+};
 use crate::diagnose::{FoundEffect, LEAST_SHOTS, Report, Verdict};
 use crate::effects::Level;
 use crate::error::Error;
@@ -230,6 +232,7 @@ impl<'a> Publication<'a> {
         }
         notices.extend(self.unchanged());
         notices.extend(self.left_out());
+        notices.extend(self.without_receivers());
         notices
     }
 
@@ -313,6 +316,23 @@ impl<'a> Publication<'a> {
                      scene",
                     one.path.display(),
                     listed(&left)
+                ));
+            }
+        }
+        notices
+    }
+
+    /// That scenes lose their other antennas, at which no effect of the radar's own echoes can be rendered.
+    fn without_receivers(&self) -> Vec<String> {
+        let mut notices = Vec::new();
+        for one in self.scenes().iter().filter(|one| !one.scene.file.receiver.is_empty()) {
+            let found = self.effects_of(one);
+            let names = of_own_echoes(&found);
+            if !names.is_empty() {
+                notices.push(format!(
+                    "the scene after {} has no [[receiver]]: nothing says what {} does at another antenna",
+                    one.path.display(),
+                    listed(&names)
                 ));
             }
         }

@@ -6,15 +6,16 @@ use super::earlier::check_folder;
 use super::recipients::{check_fit_name, find_recipient};
 use super::scene_after::{AFTER, after_of, check_beside};
 use crate::diagnose::{DiagnoseError, MeasuredScene, Report, declared_receiver, diagnose_together};
-use crate::effects::{BeamSpot, Effect, MultiBounce, library};
+use crate::effects::{Antenna, BeamSpot, Effect, SecondBounce, library};
 use crate::error::Error;
 use crate::files::folder_of;
 use crate::measure::{Cloud, CloudError};
-use crate::radar::Pattern;
+use crate::radar::{Pattern, Receiver, Returns};
 use crate::report::{Choice, Measurands, Reason};
-use crate::scene::{BounceEntry, Scene, read_text};
-use crate::setup::ReadyScene;
+use crate::scene::{Scene, read_text};
+use crate::setup::{ReadyScene, antenna};
 use crate::store::Store;
+use crate::units::ratio_from_db;
 
 /// Warning for a scene according to which every chirp would measure its power exactly.
 const NO_SPECKLE: &str = "the scene declares no speckle, so that any scatter of the powers is an effect to be found; a \
@@ -29,6 +30,8 @@ pub struct CloudRequest<'a> {
     pub scene: &'a Path,
     /// Further clouds of the same target, each with its scene.
     pub further: &'a [(&'a Path, &'a Path)],
+    /// The receiver of the scene that the one cloud is of; the radars themselves for `None`.
+    pub receiver: Option<&'a str>,
     /// Effects to try; all for an empty list.
     pub effects: &'a [&'static dyn Effect],
     /// The material that alone receives what is found; all of the scene for `None`.
@@ -47,6 +50,8 @@ pub struct CheckedRequest<'a> {
     pub request: CloudRequest<'a>,
     /// The scene with its materials.
     pub ready: ReadyScene,
+    /// The antenna that the cloud is of; none for the radar's own.
+    pub antenna: Option<Antenna>,
     /// Text of the scene file.
     pub scene_text: String,
     /// The scenes of the further clouds.
@@ -71,7 +76,7 @@ impl FurtherScene {
     fn load(path: &Path, store: Option<&Store>) -> Result<FurtherScene, Error> {
         let text = read_text(path)?;
         let scene = Scene::load(path)?;
-        check_predicted(&scene, path)?;
+        check_predicted(&scene, path, None)?;
         let ready = ReadyScene::new(scene, path, store)?;
         Ok(FurtherScene { path: path.to_owned(), ready, text })
     }
@@ -103,7 +108,8 @@ impl<'a> CloudRequest<'a> {
     pub fn check(self, store: Option<&Store>) -> Result<CheckedRequest<'a>, Error> {
         let scene_text = read_text(self.scene)?;
         let scene = Scene::load(self.scene)?;
-        check_predicted(&scene, self.scene)?;
+        let antenna = self.receiver.map(|name| self.antenna(&scene, name)).transpose()?;
+        check_predicted(&scene, self.scene, antenna)?;
         let ready = ReadyScene::new(scene, self.scene, store)?;
         let further = self.further.iter().map(|(_, path)| FurtherScene::load(path, store));
         let further = further.collect::<Result<Vec<_>, _>>()?;
@@ -118,7 +124,28 @@ impl<'a> CloudRequest<'a> {
         let scenes: Vec<&ReadyScene> =
             [&ready].into_iter().chain(further.iter().map(|one| &one.ready)).collect();
         let choice = self.choose_effects(&scenes)?;
-        Ok(CheckedRequest { request: self, ready, scene_text, further, recipient, choice })
+        Ok(CheckedRequest { request: self, ready, antenna, scene_text, further, recipient, choice })
+    }
+
+    /// The antenna of a receiver of the scene.
+    fn antenna(&self, scene: &Scene, name: &str) -> Result<Antenna, Error> {
+        if !self.further.is_empty() {
+            return Err(Error::usage(
+                format!("receiver `{name}` has one cloud, and {} are given", self.clouds().count()),
+                "diagnose its cloud alone, or leave --receiver out: several clouds are those of radars",
+            ));
+        }
+        let receivers = &scene.file.receiver;
+        if let Some(receiver) = receivers.iter().find(|receiver| receiver.name == name) {
+            return Ok(antenna(receiver, scene.radar()));
+        }
+        let names: Vec<&str> = receivers.iter().map(|receiver| receiver.name.as_str()).collect();
+        let way_out = match &names[..] {
+            [] => "leave --receiver out: the cloud is that of the radar".to_owned(),
+            names => format!("name one of {}, or leave --receiver out", names.join(", ")),
+        };
+        let scene = self.scene.display();
+        Err(Error::usage(format!("{scene} has no receiver `{name}`"), way_out))
     }
 
     /// Checks that several clouds differ and that their scenes have the same regions of the same materials.
@@ -176,7 +203,13 @@ impl<'a> CloudRequest<'a> {
     /// The effects to try: those that no scene declares, and that every scan can tell.
     fn choose_effects(&self, scenes: &[&ReadyScene]) -> Result<Choice, Error> {
         let mut declared = Vec::new();
-        let mut measured = Measurands { times: true, ranges: true };
+        let mut measured = Measurands {
+            times: true,
+            ranges: true,
+            at_other_antenna: self.receiver.is_some(),
+            by_range_receiver: false,
+            with_bounce: false,
+        };
         for ready in scenes {
             let (model, scene) = (ready.model(), &ready.scene);
             let rendered = Rendered::of(scene);
@@ -184,9 +217,11 @@ impl<'a> CloudRequest<'a> {
                 declared.push(effect.name());
             }
             declared.extend(rendered.effects().iter().map(|(effect, _)| effect.name()));
-            let (_, of_radar) = declared_receiver(scene.radar());
+            let (_, of_radar) = declared_receiver(scene.radar()).map_err(DiagnoseError::from)?;
             measured.times &= scene.chirps.is_timed();
             measured.ranges &= of_radar.range_sd_m > 0.0;
+            measured.by_range_receiver |= scene.radar().receiver.is_some();
+            measured.with_bounce |= scene.file.bounce.is_some();
         }
         let asked =
             if self.effects.is_empty() { library().to_vec() } else { self.effects.to_vec() };
@@ -199,6 +234,18 @@ impl<'a> CloudRequest<'a> {
             let unranged = choice.left_out(Reason::NoRanges).join(" and ");
             if !unranged.is_empty() {
                 return Err(DiagnoseError::Unranged { effects: unranged }.into());
+            }
+            let elsewhere = choice.left_out(Reason::OtherAntenna).join(" and ");
+            if !elsewhere.is_empty() {
+                return Err(DiagnoseError::OtherAntenna { effects: elsewhere }.into());
+            }
+            let by_receiver = choice.left_out(Reason::RangeReceiver).join(" and ");
+            if !by_receiver.is_empty() {
+                return Err(DiagnoseError::RangeReceiver { effects: by_receiver }.into());
+            }
+            let moving = choice.left_out(Reason::Bounce).join(" and ");
+            if !moving.is_empty() {
+                return Err(DiagnoseError::Bounce { effects: moving }.into());
             }
         }
         if choice.tried.is_empty() {
@@ -220,6 +267,9 @@ impl CheckedRequest<'_> {
             if !notices.contains(&notice) {
                 notices.push(notice);
             }
+        }
+        if let Some(name) = self.request.receiver {
+            notices.push(format!("the cloud is that of receiver `{name}`"));
         }
         if self.ready.scene.radar().speckle.is_none() {
             notices.push(NO_SPECKLE.to_owned());
@@ -255,8 +305,14 @@ impl CheckedRequest<'_> {
         let mut measured = Vec::new();
         for (number, (ready, cloud)) in self.scenes().zip(clouds).enumerate() {
             let ((laws, seen_lobe_rad), declared_effects) = (&laws[number], &declared[number]);
-            let scene = &ready.scene;
-            measured.push(MeasuredScene { scene, cloud, laws, seen_lobe_rad, declared_effects });
+            measured.push(MeasuredScene {
+                scene: &ready.scene,
+                cloud,
+                antenna: self.antenna,
+                laws,
+                seen_lobe_rad,
+                declared_effects,
+            });
         }
         let (seed, effects) = (self.request.seed, &self.choice.tried);
         let mut report = diagnose_together(&measured, seed, effects, hear)?;
@@ -304,47 +360,57 @@ struct Rendered {
     /// Of several rays in a spot.
     spot: Option<BeamSpot>,
     /// Of second-order paths.
-    bounces: bool,
+    bounce: Option<SecondBounce>,
 }
 
 impl Rendered {
     fn of(scene: &Scene) -> Rendered {
         let diameter_m = scene.radar().spot_fwhm_m();
         let spot = (scene.file.spot.rays > 1).then_some(BeamSpot { diameter_m });
-        Rendered { spot, bounces: scene.file.bounce.is_some() }
+        let bounce = scene.file.bounce.map(|bounce| SecondBounce {
+            outside_spot: ratio_from_db(bounce.outside_spot_db),
+            in_phase: bounce.in_phase,
+        });
+        Rendered { spot, bounce }
     }
 
     fn effects(&self) -> Vec<(&dyn Effect, Vec<f64>)> {
         let spot = self.spot.as_ref().map(|spot| (spot as &dyn Effect, Vec::new()));
-        // As strong as the laws and the antenna's pattern have it.
-        let bounces = self.bounces.then_some((&MultiBounce as &dyn Effect, vec![0.0]));
-        spot.into_iter().chain(bounces).collect()
+        let bounce = self.bounce.as_ref().map(|bounce| (bounce as &dyn Effect, Vec::new()));
+        spot.into_iter().chain(bounce).collect()
     }
 }
 
-/// Whether second-order paths are those that a diagnosis predicts.
-fn is_usual(bounce: &BounceEntry) -> bool {
-    let usual = BounceEntry::default();
-    bounce.outside_spot_db == usual.outside_spot_db && bounce.in_phase == usual.in_phase
-}
-
 /// Refuses what a scene declares and no diagnosis predicts: it would be found as an effect.
-fn check_predicted(scene: &Scene, path: &Path) -> Result<(), Error> {
+fn check_predicted(scene: &Scene, path: &Path, antenna: Option<Antenna>) -> Result<(), Error> {
     let radar = scene.radar();
-    let (what, way_out) = if scene.file.bounce.as_ref().is_some_and(|bounce| !is_usual(bounce)) {
+    let has_faults = radar.receiver.is_some_and(|receiver| {
+        let Receiver { leakage, phase_noise, sweep_ripple, .. } = receiver;
+        leakage.is_some() || phase_noise.is_some() || sweep_ripple.is_some()
+    });
+    let several_paths = scene.file.spot.rays > 1 || scene.file.bounce.is_some();
+    let (what, way_out) = if has_faults {
         (
-            "a second bounce of other side lobes than -20 dB, or in phase",
-            "replace [bounce] by [[effect]] `multi-bounce`",
+            "leakage, phase noise and a rippled sweep",
+            "remove these tables of [radar.receiver], or replace it by [radar.noise]",
         )
-    } else if radar.receiver.is_some() {
-        ("a range receiver", "replace [radar.receiver] by [radar.noise] and [radar.speckle]")
+    } else if radar.receiver.is_some() && several_paths {
+        (
+            "how a range receiver resolves several paths of a chirp",
+            "replace [radar.receiver] by [radar.noise], or set spot.rays = 1 and remove [bounce]",
+        )
+    } else if radar.receiver.is_some() && radar.returns != Returns::Strongest {
+        ("which of several echoes is not the strongest", "set radar.returns = \"strongest\"")
     } else if scene.target.transmits() {
         (
             "what lies behind a region that transmits",
             "replace the sheet by [[effect]] `covering-layer`",
         )
-    } else if !scene.file.receiver.is_empty() {
-        ("other antennas", "remove [[receiver]]; a diagnosis is of the radar's own echoes")
+    } else if antenna.is_some() && several_paths {
+        (
+            "several rays or a second bounce at an antenna apart from the radar's",
+            "set spot.rays = 1 and remove [bounce], or diagnose the radar's own cloud",
+        )
     } else {
         return Ok(());
     };

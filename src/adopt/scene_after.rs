@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::diagnose::FoundEffect;
-use crate::effects::Level;
+use crate::effects::{Level, Setting, find};
 use crate::error::Error;
 use crate::files::{FilesError, folder_of};
 use crate::formats::EffectEntry;
@@ -23,7 +23,8 @@ pub fn after_of(number: usize) -> String {
 pub const MARK: &str = "# Written by `matdb diagnose --add`, which may write it again.\n";
 
 /// The scene file with the effects of the scene and of the radar that were found, and the radar at the level that was
-/// found, dB over its settings; `materials` are the names that its regions get.
+/// found, dB over its settings; `materials` are the names that its regions get. It has no `[[receiver]]` where an effect is
+/// [of the radar's own echoes](of_own_echoes) alone.
 pub fn scene_with_found(
     scene: &Scene,
     found: &[FoundEffect],
@@ -36,12 +37,23 @@ pub fn scene_with_found(
         let loss_db = file.radar.system_loss_db - level_db;
         file.radar.system_loss_db = ((100.0 * loss_db).round() / 100.0).clamp(-200.0, 200.0);
     }
+    if !of_own_echoes(found).is_empty() {
+        file.receiver.clear();
+    }
     file.effect.extend(entries(found, Level::Scene));
     file.radar.effect.extend(entries(found, Level::Instrument));
     for (region, material) in std::iter::zip(&mut file.region, materials) {
         region.material.clone_from(material);
     }
     file
+}
+
+/// Names of the effects that were found and of which nothing says what they do at another antenna than the radar's.
+pub(super) fn of_own_echoes(found: &[FoundEffect]) -> Vec<&'static str> {
+    let is_own = |name| {
+        find(name).is_some_and(|effect| effect.about().is_excluded_by(Setting::OtherAntenna))
+    };
+    found.iter().map(|one| one.name).filter(|name| is_own(name)).collect()
 }
 
 /// The effects of a level that were found, as entries of a file.

@@ -4,6 +4,7 @@ use thiserror::Error;
 
 use super::settings::{LEAST_BLOCKS, LEAST_DETECTIONS};
 use crate::fit::FitError;
+use crate::radar::RadarError;
 use crate::render::RenderError;
 use crate::units::dbm_from_watts;
 
@@ -13,6 +14,9 @@ pub enum DiagnoseError {
     /// The scan cannot be traced, for example because no chirp meets the target.
     #[error(transparent)]
     Render(#[from] RenderError),
+    /// Settings of the range receiver that are out of range.
+    #[error(transparent)]
+    Radar(#[from] RadarError),
     /// A scattering model cannot be fitted.
     #[error(transparent)]
     Fit(#[from] FitError),
@@ -124,6 +128,33 @@ pub enum DiagnoseError {
          column `time_s`"
     )]
     Untimed {
+        /// Their names.
+        effects: String,
+    },
+    /// Effects on what comes straight back, and a cloud of an antenna apart from the radar's.
+    #[error(
+        "{effects}: that changes what comes straight back to the radar, and the cloud is that of another antenna; diagnose the \
+         radar's own cloud for it"
+    )]
+    OtherAntenna {
+        /// Their names.
+        effects: String,
+    },
+    /// Effects on speckle and noise, and a scene with a range receiver, which averages whole beat signals.
+    #[error(
+        "{effects}: a range receiver has its own speckle and noise; change `looks` under [radar.speckle] or `noise_figure_db` \
+         under [radar.receiver] instead"
+    )]
+    RangeReceiver {
+        /// Their names.
+        effects: String,
+    },
+    /// Effects that move the target, and a scene with second-order paths.
+    #[error(
+        "{effects}: that moves the target, and [bounce] follows paths on it where the scene has it; remove [bounce], or do not \
+         ask for {effects}"
+    )]
+    Bounce {
         /// Their names.
         effects: String,
     },

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::alarms::{Alarms, MOST_OVER_THRESHOLD};
 use super::error::DiagnoseError;
 use super::observation::{NO_LIMIT_W, Observation};
-use crate::effects::{BeamSpot, Model, Shot, Stage};
+use crate::effects::{Antenna, BeamSpot, Model, Shot, Stage};
 use crate::frames::{Global, Point, Ray};
 use crate::measure::cloud::{Cloud, CloudPoint};
 use crate::measure::median_point;
@@ -75,8 +75,9 @@ pub fn match_cloud(
     shots: &[Shot],
     threshold_w: f64,
     returns: Returns,
+    antenna: Option<Antenna>,
 ) -> Result<CloudMatch, DiagnoseError> {
-    let scan = Scan { threshold_w, returns, ..Scan::new(chirps) };
+    let scan = Scan { threshold_w, returns, antenna, ..Scan::new(chirps) };
     let is_numbered = cloud.points().iter().all(|point| point.chirp.is_some());
     if !is_numbered && scan.directions.is_none() {
         return Err(DiagnoseError::Unnumbered);
@@ -131,6 +132,8 @@ struct Scan<'a> {
     threshold_w: f64,
     /// Which detections of a chirp are reported.
     returns: Returns,
+    /// The antenna of the cloud; none for the radar's own.
+    antenna: Option<Antenna>,
     /// `None` unless all rays start from one point.
     directions: Option<Directions>,
 }
@@ -139,7 +142,8 @@ impl Scan<'_> {
     fn new(chirps: &Chirps) -> Scan<'_> {
         let index_of_chirp = chirps.number.iter().copied().zip(0..).collect();
         let directions = Directions::new(chirps);
-        Scan { chirps, index_of_chirp, threshold_w: 0.0, returns: Returns::Strongest, directions }
+        let returns = Returns::Strongest;
+        Scan { chirps, index_of_chirp, threshold_w: 0.0, returns, antenna: None, directions }
     }
 
     /// The ray of a chirp.
@@ -150,6 +154,27 @@ impl Scan<'_> {
     /// The chirp in whose direction a point lies.
     fn chirp_towards(&self, point: Point<Global>) -> Option<u32> {
         self.directions.as_ref()?.chirp(self.chirps, point)
+    }
+
+    /// Range of a point, m: half of the way to the antenna.
+    fn range_m(&self, point: &CloudPoint, shot: &Shot) -> f64 {
+        let (radar, there) = (shot.ray.origin, point.point);
+        point.range_m.unwrap_or_else(|| match self.antenna {
+            None => radar.distance_m(there),
+            Some(antenna) => antenna.half_way_m(radar, there),
+        })
+    }
+
+    /// Range at which a chirp meets the target, m: half of the way to the antenna.
+    fn expected_m(&self, shot: &Shot) -> f64 {
+        self.antenna
+            .map_or(shot.hit.range_m, |antenna| antenna.half_way_m(shot.ray.origin, shot.hit.point))
+    }
+
+    /// Distance of a point from where its chirp meets the target: in range and across the ray, m.
+    fn off_m(&self, point: &CloudPoint, shot: &Shot) -> f64 {
+        let off_m = (self.range_m(point, shot) - self.expected_m(shot)).abs();
+        off_m + off_ray_m(point, &shot.ray).length()
     }
 
     /// Whether most points lie off the rays of their chirps by one common shift.
@@ -208,7 +233,7 @@ impl Scan<'_> {
         }
         if self.returns == Returns::All {
             points.sort_by_cached_key(|(point, chirp)| {
-                let off_m = chirp.and_then(&shot).map_or(0.0, |shot| off_m(point, shot));
+                let off_m = chirp.and_then(&shot).map_or(0.0, |shot| self.off_m(point, shot));
                 // Of distances, which are positive, the bits have the same order.
                 off_m.to_bits()
             });
@@ -252,8 +277,8 @@ impl Scan<'_> {
                 index.and_then(|index| Some((shots.get(index)?, observations.get_mut(index)?)))
             {
                 // The chirp meets the target.
-                let range_m = range_m(point, shot);
-                let is_near = off_m(point, shot) <= GATE_M;
+                let range_m = self.range_m(point, shot);
+                let is_near = self.off_m(point, shot) <= GATE_M;
                 let is_first = observation.power_w.is_none();
                 if is_near && is_first {
                     on_target += 1;
@@ -267,7 +292,7 @@ impl Scan<'_> {
                 {
                     match self.returns {
                         Returns::Strongest if is_first => observation.limit_w = Some(point.power_w),
-                        Returns::First if is_first && range_m < shot.hit.range_m => {
+                        Returns::First if is_first && range_m < self.expected_m(shot) => {
                             observation.limit_w = Some(NO_LIMIT_W);
                         }
                         _ => {}
@@ -285,7 +310,7 @@ impl Scan<'_> {
                 // The chirp misses, or the scan has no such chirp.
                 let sent = chirp.and_then(|chirp| self.index_of_chirp.get(&chirp).copied());
                 let shot = sent.map(|index| Shot::missed(self.chirps, index, progress[index]));
-                let range_m = shot.map_or(0.0, |shot| range_m(point, &shot));
+                let range_m = shot.map_or(0.0, |shot| self.range_m(point, &shot));
                 if let Some(shot) = shot {
                     if is_past_an_edge(point, &shot, target.as_ref()) {
                         let is_first = past_the_edge.insert(shot.chirp);
@@ -293,7 +318,7 @@ impl Scan<'_> {
                         second += usize::from(!is_first);
                     } else if self.is_alarm(point, &shot, &mut spoke) {
                         alarms.powers_w.push(point.power_w);
-                        alarm_ranges_m.push(range_m);
+                        alarm_ranges_m.push(shot.ray.origin.distance_m(point.point));
                         continue;
                     }
                 }
@@ -372,19 +397,9 @@ fn expected_near(missing: &[&Ray<Global>], ranges_m: &[f64], target: Option<&Nea
     ranges_m.len() as f64 * near / (1.0 - near).max(1e-3)
 }
 
-/// Range of a point, m.
-fn range_m(point: &CloudPoint, shot: &Shot) -> f64 {
-    point.range_m.unwrap_or_else(|| shot.ray.origin.distance_m(point.point))
-}
-
 /// The shortest way from a ray to a point, m.
 fn off_ray_m(point: &CloudPoint, ray: &Ray<Global>) -> DVec3 {
     let along = ray.direction.xyz();
     let from_origin = point.point.xyz - ray.origin.xyz;
     from_origin - from_origin.dot(along) * along
-}
-
-/// Distance of a point from where its chirp meets the target: along the ray and across it, m.
-fn off_m(point: &CloudPoint, shot: &Shot) -> f64 {
-    (range_m(point, shot) - shot.hit.range_m).abs() + off_ray_m(point, &shot.ray).length()
 }

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::observation::Observation;
 use super::problem::Problem;
 use super::space::Space;
-use crate::effects::{Effect, Model, Shot, Twist, way_m};
+use crate::effects::{Effect, Model, Shot, Stage, Twist, way_m};
 use crate::measure::icp::bulk_sd_m;
 
 /// Most rounds of tracing.
@@ -92,19 +92,25 @@ fn rows(problem: &Problem, space: &Space, effect: &dyn Effect, at: &DVector<f64>
             let range_m = seen.range_m.filter(|_| problem.declared.range_sd_m > 0.0)?;
             let acts = effect.scans().is_empty() || effect.scans().contains(&shot.scan);
             let model = models.get(usize::from(shot.scan)).filter(|_| acts)?;
-            let placed = model.placed(problem.stage(shot), *shot)?;
-            let twists = effect.twists(&values, problem.stage(shot), &placed);
+            let stage = problem.stage(shot);
+            let placed = model.placed(stage, *shot)?;
+            let twists = effect.twists(&values, stage, &placed);
             let steps = effect.parameters().iter().map(|known| known.step);
             let slopes_m = twists.iter().zip(steps);
-            let slopes_m = slopes_m.map(|(twist, step)| step * slope_m(problem, twist, &placed));
-            Some(Row { off_m: range_m - placed.hit.range_m, slopes_m: slopes_m.collect() })
+            let slopes_m = slopes_m.map(|(twist, step)| step * slope_m(stage, twist, &placed));
+            let expected_m = stage.range_m(placed.ray.origin, &placed.hit);
+            Some(Row { off_m: range_m - expected_m, slopes_m: slopes_m.collect() })
         })
         .collect()
 }
 
 /// Change of the range of a shot by a small motion of the target, m: the way of its surface point, projected on the normal
-/// and seen along the ray.
-fn slope_m(problem: &Problem, twist: &Twist, shot: &Shot) -> f64 {
-    let way_m = way_m(twist, problem.stage(shot).middle, shot.hit.point.xyz);
-    -way_m.dot(shot.normal) / shot.hit.cos_theta.max(0.05)
+/// and seen along the ray. At an antenna apart from the radar's, half of that and of what it adds to the way back.
+fn slope_m(stage: &Stage, twist: &Twist, shot: &Shot) -> f64 {
+    let way_m = way_m(twist, stage.middle, shot.hit.point.xyz);
+    let along_ray_m = -way_m.dot(shot.normal) / shot.hit.cos_theta.max(0.05);
+    let towards = stage.antenna.and_then(|at| shot.hit.point.towards(at.position));
+    towards.map_or(along_ray_m, |towards| {
+        0.5 * (1.0 - shot.ray.direction.xyz().dot(towards.xyz())) * along_ray_m
+    })
 }

@@ -10,9 +10,9 @@ use super::settings::Diagnosis;
 use super::shots::trace_shots;
 use super::subject::Subject;
 use crate::brdf::Brdf;
-use crate::effects::{Effect, Receiver, Stage, middle};
+use crate::effects::{Antenna, Effect, Receiver, Stage, middle};
 use crate::measure::Cloud;
-use crate::radar::{Link, Radar};
+use crate::radar::{Link, Radar, RadarError, RangeProcessor};
 use crate::scene::Scene;
 use crate::trace::{Bvh, ScanGeometry};
 use crate::units::watts_from_dbm;
@@ -27,6 +27,8 @@ pub struct MeasuredScene<'a> {
     pub scene: &'a Scene,
     /// The cloud, in the global frame.
     pub cloud: &'a Cloud,
+    /// The antenna that the cloud is of; none for the radar's own.
+    pub antenna: Option<Antenna>,
     /// Scattering model of each region, where the refit begins.
     pub laws: &'a [Brdf],
     /// Width of the narrowest lobe of a region whose lobes include the beam that saw them, rad.
@@ -68,14 +70,14 @@ pub fn diagnose_together(
     let bvhs: Vec<Bvh> = targets.clone().map(|target| Bvh::new(&target.mesh)).collect();
     let grains: Vec<Vec<DVec3>> =
         targets.map(|target| target.regions.iter().map(|region| region.grain).collect()).collect();
-    let (receiver, declared) = declared_receiver(first.scene.radar());
+    let (receiver, declared) = declared_receiver(first.scene.radar())?;
     let (mut stages, mut shots) = (Vec::new(), Vec::new());
     let (mut observations, mut strays, mut alarms) = (Vec::new(), Vec::new(), Vec::new());
     for (number, one) in measured.iter().enumerate() {
-        if one.received() != first.received() {
+        if one.received()? != first.received()? {
             return Err(DiagnoseError::OtherReceiver { cloud: number + 1 });
         }
-        let MeasuredScene { scene, cloud, seen_lobe_rad, .. } = *one;
+        let MeasuredScene { scene, cloud, antenna, seen_lobe_rad, .. } = *one;
         let radar = scene.radar();
         // Every chirp against the target.
         let (bvh, region_of_facet) = (&bvhs[number], &scene.target.region_of_facet);
@@ -85,13 +87,15 @@ pub fn diagnose_together(
             grain_of_region: &grains[number],
             seen_lobe_rad,
             on_wavefront: false,
+            antenna,
             middle: DVec3::ZERO,
         };
         let mut own = trace_shots(&stage)?;
         stage.middle = middle(&own);
         // The cloud against the chirps.
+        let ReceiverLimits { threshold_w, .. } = declared;
         let mut matched =
-            match_cloud(cloud, &scene.chirps, &own, declared.threshold_w, radar.returns)?;
+            match_cloud(cloud, &scene.chirps, &own, threshold_w, radar.returns, antenna)?;
         matched.alarms.cells = radar.gate_cells();
         matched.alarms.looks = radar.noise_looks();
         let of_strays = matched.strays.iter_mut().filter_map(|stray| stray.shot.as_mut());
@@ -122,20 +126,30 @@ pub fn diagnose_together(
 
 impl MeasuredScene<'_> {
     /// The receiver with the declared effects on it, and its limits.
-    fn received(&self) -> (Receiver, ReceiverLimits) {
-        let (receiver, limits) = declared_receiver(self.scene.radar());
+    fn received(&self) -> Result<(Receiver, ReceiverLimits), RadarError> {
+        let (receiver, limits) = declared_receiver(self.scene.radar())?;
         let effects = self.declared_effects.iter();
-        (effects.fold(receiver, |receiver, (effect, v)| effect.receive(v, receiver)), limits)
+        Ok((effects.fold(receiver, |receiver, (effect, v)| effect.receive(v, receiver)), limits))
     }
 }
 
-/// A radar's receiver, its threshold and its error of ranges, as declared.
-pub fn declared_receiver(radar: &Radar) -> (Receiver, ReceiverLimits) {
-    let receiver = Receiver::declared(radar);
-    let receiver = Receiver { looks: receiver.looks.min(MOST_LOOKS), ..receiver };
+/// A radar's receiver, its threshold and its error of ranges, as declared. One with `[radar.receiver]` has the noise in a bin
+/// of its spectrum and its own threshold.
+///
+/// # Errors
+/// A setting of the range receiver that is out of range.
+pub fn declared_receiver(radar: &Radar) -> Result<(Receiver, ReceiverLimits), RadarError> {
+    let mut receiver = Receiver::declared(radar);
     let range_sd_m = radar.noise.map_or(0.0, |noise| noise.range_sd_m);
-    let threshold_w = watts_from_dbm(radar.threshold_dbm);
-    (receiver, ReceiverLimits { threshold_w, range_sd_m })
+    let mut threshold_w = watts_from_dbm(radar.threshold_dbm);
+    if let Some(of_ranges) = radar.receiver {
+        let looks = radar.speckle.map_or(1, |speckle| speckle.looks as u32);
+        let processor =
+            RangeProcessor::new(&of_ranges, &radar.chirp(), radar.threshold_dbm, looks)?;
+        (receiver.noise_w, threshold_w) = (processor.noise_per_bin_w(), processor.threshold_w());
+    }
+    receiver.looks = receiver.looks.min(MOST_LOOKS);
+    Ok((receiver, ReceiverLimits { threshold_w, range_sd_m }))
 }
 
 /// Poses of the meshes of a scene.

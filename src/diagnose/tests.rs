@@ -159,6 +159,7 @@ impl Bench {
             grain_of_region: &[DVec3::Y],
             seen_lobe_rad: &[],
             on_wavefront: false,
+            antenna: None,
             middle: DVec3::new(0.0, 1.1, 0.0),
         }
     }
@@ -511,7 +512,7 @@ fn a_cloud_finds_its_shots() {
     let numbered = Cloud::new(points.clone()).unwrap();
     points.push(point(&shots[9], missed, 0.0));
     let cloud = Cloud::new(points.clone()).unwrap();
-    let found = match_cloud(&cloud, chirps, &shots, THRESHOLD_W, Returns::Strongest).unwrap();
+    let found = match_cloud(&cloud, chirps, &shots, THRESHOLD_W, Returns::Strongest, None).unwrap();
     let [behind, beside] = &found.strays[..] else { panic!("{:?}", found.strays) };
     assert_eq!(behind.shot, Some(shots[8]));
     assert!((behind.range_m - shots[8].hit.range_m - 0.5).abs() < 1e-9);
@@ -522,7 +523,7 @@ fn a_cloud_finds_its_shots() {
     points.iter_mut().for_each(|point| point.chirp = None);
     let cloud = Cloud::new(points.clone()).unwrap();
     let by_direction =
-        match_cloud(&cloud, chirps, &shots, THRESHOLD_W, Returns::Strongest).unwrap();
+        match_cloud(&cloud, chirps, &shots, THRESHOLD_W, Returns::Strongest, None).unwrap();
     assert_eq!(by_direction.observations, found.observations);
     // Points with the numbers of other chirps are refused.
     for off in [1, -1] {
@@ -536,6 +537,7 @@ fn a_cloud_finds_its_shots() {
             &shots,
             THRESHOLD_W,
             Returns::Strongest,
+            None,
         );
         let Err(DiagnoseError::Misnumbered { off: found }) = refused else { panic!("{refused:?}") };
         assert_eq!(found, i64::from(off));
@@ -556,13 +558,21 @@ fn a_cloud_finds_its_shots() {
             .map(|point| CloudPoint { chirp: point.chirp.map(|chirp| chirp + first), ..*point });
         let cloud = Cloud::new(of_pass.collect()).unwrap();
         let found =
-            match_cloud(&cloud, &passes, &shots_twice, THRESHOLD_W, Returns::Strongest).unwrap();
+            match_cloud(&cloud, &passes, &shots_twice, THRESHOLD_W, Returns::Strongest, None)
+                .unwrap();
         assert_eq!(found.observations.iter().filter(|o| o.power_w.is_some()).count(), 8);
     }
     // Row numbers in place of chirp numbers are refused.
     let given = |points: Vec<CloudPoint>| {
-        match_cloud(&Cloud::new(points).unwrap(), chirps, &shots, THRESHOLD_W, Returns::Strongest)
-            .unwrap_err()
+        match_cloud(
+            &Cloud::new(points).unwrap(),
+            chirps,
+            &shots,
+            THRESHOLD_W,
+            Returns::Strongest,
+            None,
+        )
+        .unwrap_err()
     };
     let on_target = &numbered.points()[..8];
     let rows =
@@ -585,8 +595,14 @@ fn a_cloud_finds_its_shots() {
     assert!(matches!(twice, DiagnoseError::Repeated { second: 8, points: 16 }), "{twice}");
     // A cloud of something else is refused.
     points.iter_mut().for_each(|p| p.point = Point::from(p.point.xyz + DVec3::new(0.0, 0.0, 3.0)));
-    let elsewhere =
-        match_cloud(&Cloud::new(points).unwrap(), chirps, &shots, THRESHOLD_W, Returns::Strongest);
+    let elsewhere = match_cloud(
+        &Cloud::new(points).unwrap(),
+        chirps,
+        &shots,
+        THRESHOLD_W,
+        Returns::Strongest,
+        None,
+    );
     assert!(matches!(elsewhere, Err(DiagnoseError::Elsewhere { matched: 0, points: 9 })));
     assert!((found.observations[20].power_w.unwrap() - 1e-9).abs() < 1e-20);
     assert!((found.observations[20].range_m.unwrap() - shots[20].hit.range_m - 1e-3).abs() < 1e-9);
@@ -610,7 +626,7 @@ fn a_false_alarm_at_the_target_says_what_its_kind_of_return_says() {
     points.extend((20..28).map(|shot| point(shot, 1e-3, 1e-9)));
     let matched = |points: &[CloudPoint], returns| {
         let cloud = Cloud::new(points.to_vec()).unwrap();
-        match_cloud(&cloud, chirps, &shots, THRESHOLD_W, returns).unwrap()
+        match_cloud(&cloud, chirps, &shots, THRESHOLD_W, returns, None).unwrap()
     };
     let limits = |found: &CloudMatch| [before, behind].map(|shot| found.observations[shot].limit_w);
     let strongest = matched(&points, Returns::Strongest);
@@ -665,7 +681,7 @@ fn a_wide_spot_sees_past_the_edge() {
         Cloud::new(chirps.number.iter().zip(&chirps.rays).filter_map(point).collect()).unwrap()
     };
     let seen = cloud(0.0);
-    let found = match_cloud(&seen, chirps, &shots, THRESHOLD_W, Returns::Strongest).unwrap();
+    let found = match_cloud(&seen, chirps, &shots, THRESHOLD_W, Returns::Strongest, None).unwrap();
     assert!(found.strays.len() * 3 > seen.points().len(), "{}", found.strays.len());
     // The radar's own beam, of 16 mm, reaches some of them, of the 80 mm beside the plate.
     let model = Model { laws: vec![law()], receiver: receiver(), effects: vec![], level: 1.0 };
@@ -678,10 +694,11 @@ fn a_wide_spot_sees_past_the_edge() {
     let mut twice = [seen.points(), &strays, &strays].concat();
     twice.iter_mut().for_each(|point| point.chirp = None);
     let twice = Cloud::new(twice).unwrap();
-    let twice = match_cloud(&twice, chirps, &shots, THRESHOLD_W, Returns::Strongest).unwrap_err();
+    let twice =
+        match_cloud(&twice, chirps, &shots, THRESHOLD_W, Returns::Strongest, None).unwrap_err();
     assert!(matches!(twice, DiagnoseError::Repeated { .. }), "{twice}");
-    let behind =
-        match_cloud(&cloud(0.5), chirps, &shots, THRESHOLD_W, Returns::Strongest).unwrap_err();
+    let behind = match_cloud(&cloud(0.5), chirps, &shots, THRESHOLD_W, Returns::Strongest, None)
+        .unwrap_err();
     assert!(matches!(behind, DiagnoseError::Elsewhere { matched: 0, .. }), "{behind}");
 }
 

@@ -197,6 +197,13 @@ pub struct About {
     pub conflicts: &'static [Conflict],
 }
 
+impl About {
+    /// Whether a setting of a scene excludes the effect.
+    pub fn is_excluded_by(&self, setting: Setting) -> bool {
+        self.conflicts.iter().any(|conflict| conflict.with == setting)
+    }
+}
+
 /// A setting of a scene that excludes an effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Conflict {
@@ -215,6 +222,20 @@ impl Conflict {
         problem: "moves the target, and [bounce] follows paths on it where the scene has it",
         way_out: "remove [bounce], or move the mesh by its translation_m and rotation_deg",
     };
+
+    /// The conflict of every effect that follows rays to the first surface.
+    pub(super) const OF_SHEETS: Conflict = Conflict {
+        with: Setting::Sheets,
+        problem: "follows rays to the first surface, and some regions let them pass on",
+        way_out: "remove the effect, or `transmits` and `thickness_m` of the regions",
+    };
+
+    /// The conflict of every effect that changes what comes straight back.
+    pub(super) const OF_BACKSCATTER: Conflict = Conflict {
+        with: Setting::OtherAntenna,
+        problem: "changes what comes back to the radar, and nothing says what it does at another antenna",
+        way_out: "remove [[receiver]], or the effect",
+    };
 }
 
 /// A setting of a scene.
@@ -226,6 +247,10 @@ pub enum Setting {
     Bounce,
     /// `[radar.receiver]`.
     RangeReceiver,
+    /// Regions that let rays pass on.
+    Sheets,
+    /// `[[receiver]]`, for the echoes at an antenna apart from the radar's.
+    OtherAntenna,
 }
 
 /// The level of an effect, which says where it is stored after a diagnosis has found it.

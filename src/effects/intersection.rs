@@ -11,7 +11,8 @@ pub(super) fn local_frame(stage: &Stage, shot: &Shot) -> LocalFrame {
     LocalFrame::new(shot.normal, grain(stage, shot.region))
 }
 
-fn grain(stage: &Stage, region: u16) -> DVec3 {
+/// Direction of the grain of a region, global frame, where the scene has the target.
+pub(super) fn grain(stage: &Stage, region: u16) -> DVec3 {
     stage.grain_of_region.get(usize::from(region)).copied().unwrap_or(DVec3::Y)
 }
 

@@ -11,6 +11,7 @@
 //! An effect whose parameters are at their [`absent`](EffectParameter::absent) values changes nothing,
 //! exactly. [`library`] lists all effects; a new one is a file and a line of the list.
 
+mod antenna;
 mod cache;
 mod ceiling;
 mod declared;
@@ -30,7 +31,9 @@ mod spread;
 mod testing;
 mod tilt;
 mod twist;
+mod way_back;
 
+pub use antenna::Antenna;
 pub use ceiling::{Ceiling, Output, SaturationCurve};
 pub use declared::SceneEffects;
 pub use echo::MeanEcho;
@@ -38,7 +41,7 @@ pub use effect::{About, Conflict, Effect, EffectParameter, Level, Setting, Surve
 pub use entry::{EffectError, EffectList, entry, resolve};
 pub(crate) use intersection::shot_at;
 pub(crate) use library::finite_spot::BeamSpot;
-pub(crate) use library::multi_bounce::MultiBounce;
+pub(crate) use library::multi_bounce::SecondBounce;
 pub(crate) use library::rank;
 pub use library::{find, library};
 pub(crate) use member::family;

@@ -15,7 +15,8 @@ use super::receiver::Receiver;
 use super::shot::{Shot, Stage};
 use super::tilt::{NODES, nodes, tilted_cos_theta};
 use super::twist::Twist;
-use crate::brdf::{Brdf, Retro, Scattering};
+use super::way_back::WayBack;
+use crate::brdf::{Brdf, Retro, Scattering, Seen};
 use crate::frames::{Direction, Global, Pose, Ray, Surface};
 use crate::radar::scan::PATTERN_RANGE_M;
 use crate::trace::{Hit, closest};
@@ -66,8 +67,32 @@ pub struct PredictionCache {
 /// Shots that one task evaluates, so many that loops over them fill vector instructions.
 const SHOTS_PER_TASK: usize = 256;
 
-/// A shot where the effects place it, and the direction of the radar from its surface.
-type Intersection = (Shot, Direction<Surface>);
+/// A shot where the effects place it.
+#[derive(Clone)]
+struct Intersection {
+    shot: Shot,
+    /// Direction of the radar from its surface.
+    to_radar: Direction<Surface>,
+    /// The way to an antenna apart from the radar's.
+    way_back: Option<WayBack>,
+}
+
+impl Intersection {
+    fn new(stage: &Stage, shot: Shot, to_radar: Direction<Surface>) -> Intersection {
+        let way_back = stage.antenna.map(|antenna| WayBack::new(&antenna, stage, &shot));
+        Intersection { shot, to_radar, way_back }
+    }
+
+    /// Of a shot that its ray hits as it is.
+    fn of_shot(stage: &Stage, shot: &Shot) -> Intersection {
+        Intersection::new(stage, *shot, shot.to_radar())
+    }
+
+    /// Range of its echo, m.
+    fn range_m(&self) -> f64 {
+        self.way_back.map_or(self.shot.hit.range_m, |way| way.range_m)
+    }
+}
 
 /// Name of an effect, and the values on which a result depends.
 type Key = (&'static str, Vec<f64>);
@@ -143,7 +168,7 @@ impl Model<'_> {
         let f_per_sr = cache.scattered.get_or_make((self.laws.clone(), moving), || {
             let laws = self.retros();
             let tasks = intersections.par_chunks(SHOTS_PER_TASK);
-            tasks.map(|shots| f_per_sr(stage, &laws, shots)).collect::<Vec<_>>().concat()
+            tasks.map(|shots| self.f_per_sr(stage, &laws, shots)).collect::<Vec<_>>().concat()
         });
         let gains = cache.gains.get_or_make(self.keys(|_| true), || {
             let tasks = intersections.par_chunks(SHOTS_PER_TASK);
@@ -155,9 +180,9 @@ impl Model<'_> {
             .zip(&*f_per_sr)
             .zip(&*gains)
             .map(|((intersection, f_per_sr), gain)| {
-                let (shot, _) = intersection.as_ref()?;
-                let power_w = gain * self.scattered_w(stage, shot, *f_per_sr);
-                Some(MeanEcho::at_once(power_w, shot.hit.range_m))
+                let intersection = intersection.as_ref()?;
+                let power_w = gain * self.scattered_w(stage, intersection, *f_per_sr);
+                Some(MeanEcho::at_once(power_w, intersection.range_m()))
             })
             .collect();
         let receiver = self.received();
@@ -194,10 +219,10 @@ impl Model<'_> {
         let of_task = |(shots, arrived): (&[Option<Intersection>], &[Option<MeanEcho>])| {
             let tilted = shots.iter().flat_map(|shot| nodes.map(|(by, _)| tilted(shot, by)));
             let tilted: Vec<Option<Intersection>> = tilted.collect();
-            let f_per_sr = f_per_sr(stage, &laws, &tilted);
+            let f_per_sr = self.f_per_sr(stage, &laws, &tilted);
             let gains = self.gains(stage, &tilted);
             let powers = tilted.iter().zip(f_per_sr).zip(gains).map(|((at, f_per_sr), gain)| {
-                at.as_ref().map_or(0.0, |(shot, _)| gain * self.scattered_w(stage, shot, f_per_sr))
+                at.as_ref().map_or(0.0, |at| gain * self.scattered_w(stage, at, f_per_sr))
             });
             let power_w: Vec<f64> = powers.collect();
             let of_shots = power_w.chunks_exact(NODES).zip(arrived);
@@ -213,6 +238,21 @@ impl Model<'_> {
             tilts.collect::<Vec<Tilts>>()
         };
         tasks.map(of_task).collect::<Vec<_>>().concat()
+    }
+
+    /// f of the laws without effects towards the stage's antenna, 1/sr, of every shot that hits the target; 0 of any
+    /// other.
+    fn f_per_sr(
+        &self,
+        stage: &Stage,
+        retros: &[Retro],
+        shots: &[Option<Intersection>],
+    ) -> Vec<f64> {
+        if stage.antenna.is_none() {
+            return retro_per_sr(stage, retros, shots);
+        }
+        let hits = shots.iter().map(Option::as_ref);
+        hits.map(|hit| hit.map_or(0.0, |hit| bistatic_per_sr(stage, &self.laws, hit))).collect()
     }
 
     /// The laws, to be asked for backscatter alone.
@@ -233,7 +273,7 @@ impl Model<'_> {
         let targets: Vec<Option<Pose<Global, Global>>> =
             shots.par_iter().map(|shot| self.target(stage, shot)).collect();
         if targets.iter().all(Option::is_none) {
-            return shots.par_iter().map(|shot| Some((*shot, shot.to_radar()))).collect();
+            return shots.par_iter().map(|shot| Some(Intersection::of_shot(stage, shot))).collect();
         }
         let rays: Vec<Ray<Global>> = shots
             .par_iter()
@@ -244,8 +284,11 @@ impl Model<'_> {
         (shots, &targets, &rays, &hits)
             .into_par_iter()
             .map(|(shot, target, ray, hit)| match *target {
-                None => Some((*shot, shot.to_radar())),
-                Some(target) => Some(moved(stage, shot, target, *ray, (*hit)?)),
+                None => Some(Intersection::of_shot(stage, shot)),
+                Some(target) => {
+                    let (shot, to_radar) = moved(stage, shot, target, *ray, (*hit)?);
+                    Some(Intersection::new(stage, shot, to_radar))
+                }
             })
             .collect()
     }
@@ -278,7 +321,7 @@ impl Model<'_> {
         directions.into_iter().filter_map(|way| self.range_m(stage, shot, way)).collect()
     }
 
-    /// Range, m, at which a shot would hit the target in another direction.
+    /// Range of the echo, m, where a shot would hit the target in another direction.
     fn range_m(&self, stage: &Stage, shot: &Shot, direction: DVec3) -> Option<f64> {
         let ray = Ray { direction: Direction::new(direction)?, ..shot.ray };
         let hit = if self.effects.iter().any(|(effect, _)| effect.moves()) {
@@ -286,12 +329,27 @@ impl Model<'_> {
         } else {
             stage.geometry.bvh.closest(&ray)?
         };
-        Some(hit.range_m)
+        Some(stage.range_m(ray.origin, &hit))
     }
 
-    /// The mean echo of one shot by itself.
+    /// The mean echo of one shot by itself: equation (11) with every effect on the surface and the gain.
     pub(crate) fn arrived(&self, stage: &Stage, shot: &Shot) -> MeanEcho {
-        MeanEcho::at_once(self.power_w(stage, shot), shot.hit.range_m)
+        let at = Intersection::of_shot(stage, shot);
+        let f_per_sr = match at.way_back {
+            None => self.seen(stage, shot, stage.widening_of_shot_rad(shot)).f_per_sr,
+            Some(_) => bistatic_per_sr(stage, &self.laws, &at),
+        };
+        let power_w = self.gain(stage, shot) * self.scattered_w(stage, &at, f_per_sr);
+        MeanEcho::at_once(power_w, at.range_m())
+    }
+
+    /// What a beam of a divergence, rad, sees of the scattering model of a shot without effects.
+    pub(crate) fn seen(&self, stage: &Stage, shot: &Shot, beam_rad: f64) -> Seen {
+        let Some(law) = self.laws.get(usize::from(shot.region)) else { return Seen::default() };
+        match stage.antenna {
+            None => law.seen_by(beam_rad, shot.to_radar(), shot.to_radar()),
+            Some(antenna) => WayBack::new(&antenna, stage, shot).seen(law, beam_rad),
+        }
     }
 
     /// Applies the effects that act on the echoes of all shots together.
@@ -322,25 +380,16 @@ impl Model<'_> {
         receiver
     }
 
-    /// Equation (11) with every effect on the surface and the gain.
-    fn power_w(&self, stage: &Stage, shot: &Shot) -> f64 {
-        let f_per_sr = self.law_per_sr(stage, shot);
-        self.gain(stage, shot) * self.scattered_w(stage, shot, f_per_sr)
-    }
-
-    /// f of the scattering model of a shot without effects, 1/sr.
-    fn law_per_sr(&self, stage: &Stage, shot: &Shot) -> f64 {
-        let (law, to_radar) = (self.laws.get(usize::from(shot.region)), shot.to_radar());
-        let beam_rad = stage.widening_of_shot_rad(shot);
-        law.map_or(0.0, |law| law.seen_by(beam_rad, to_radar, to_radar).f_per_sr)
-    }
-
     /// Equation (11) with every effect on the surface, W.
-    fn scattered_w(&self, stage: &Stage, shot: &Shot, law_per_sr: f64) -> f64 {
+    fn scattered_w(&self, stage: &Stage, at: &Intersection, law_per_sr: f64) -> f64 {
+        let Intersection { shot, way_back, .. } = at;
         let Some(law) = self.laws.get(usize::from(shot.region)) else { return 0.0 };
         let mut f_per_sr = law_per_sr;
         for (effect, values) in &self.effects {
             f_per_sr = effect.scatter(values, stage, law, shot, f_per_sr);
+        }
+        if let Some(way) = way_back {
+            return stage.link.flux_w(shot.hit.cos_theta) * f_per_sr * way.projected_sr;
         }
         let beam = stage.beam(shot);
         stage.link.power_w(&beam, shot.hit.range_m, shot.hit.cos_theta, f_per_sr)
@@ -351,7 +400,7 @@ impl Model<'_> {
         let mut gains: Vec<f64> =
             shots.iter().map(|shot| f64::from(u8::from(shot.is_some()))).collect();
         let shots: Vec<Option<&Shot>> =
-            shots.iter().map(|shot| shot.as_ref().map(|(shot, _)| shot)).collect();
+            shots.iter().map(|shot| shot.as_ref().map(|at| &at.shot)).collect();
         for (effect, values) in &self.effects {
             effect.multiply_gains(values, stage, &shots, &mut gains);
         }
@@ -364,14 +413,14 @@ impl Model<'_> {
     }
 }
 
-/// f of the laws without effects, 1/sr, of every shot that hits the target; 0 of any other.
-fn f_per_sr(stage: &Stage, laws: &[Retro], shots: &[Option<Intersection>]) -> Vec<f64> {
+/// f of the laws in backscatter without effects, 1/sr, of every shot that hits the target; 0 of any other.
+fn retro_per_sr(stage: &Stage, laws: &[Retro], shots: &[Option<Intersection>]) -> Vec<f64> {
     let mut f_per_sr = vec![0.0; shots.len()];
     for (region, law) in (0..).zip(laws) {
         let hits = shots.iter().enumerate().filter_map(|(at, shot)| Some((at, shot.as_ref()?)));
         let (places, looks): (Vec<usize>, Vec<_>) = hits
-            .filter(|(_, (shot, _))| shot.region == region)
-            .map(|(at, (shot, to_radar))| (at, (stage.widening_of_shot_rad(shot), *to_radar)))
+            .filter(|(_, hit)| hit.shot.region == region)
+            .map(|(at, hit)| (at, (stage.widening_of_shot_rad(&hit.shot), hit.to_radar)))
             .unzip();
         for (at, one_per_sr) in places.into_iter().zip(law.per_sr(&looks)) {
             f_per_sr[at] = one_per_sr;
@@ -380,11 +429,26 @@ fn f_per_sr(stage: &Stage, laws: &[Retro], shots: &[Option<Intersection>]) -> Ve
     f_per_sr
 }
 
+/// f of the law of a shot without effects, 1/sr, on its way to an antenna apart from the radar's, which receives the
+/// polarisation that was sent. 0 of a shot without such a way.
+fn bistatic_per_sr(stage: &Stage, laws: &[Brdf], hit: &Intersection) -> f64 {
+    let Intersection { shot, way_back: Some(way), .. } = hit else { return 0.0 };
+    let Some(law) = laws.get(usize::from(shot.region)) else { return 0.0 };
+    let beam_rad = stage.divergence_rad(shot);
+    let seen = way.seen(law, beam_rad);
+    // Lobes that include the beam that saw them are not widened again; their parts are.
+    let widening_rad = stage.widening_rad(shot.region, beam_rad);
+    let f_per_sr =
+        if widening_rad == beam_rad { seen.f_per_sr } else { way.seen(law, widening_rad).f_per_sr };
+    let polarisation = &stage.geometry.radar.polarisation;
+    f_per_sr * way.co_polar_share(polarisation, law, seen.specular_share)
+}
+
 /// A shot with its normal tilted by these tangents, along the plane of incidence and across it; `None` if the facet then
 /// faces away.
 fn tilted(shot: &Option<Intersection>, by: [f64; 2]) -> Option<Intersection> {
-    let (shot, to_radar) = shot.as_ref()?;
+    let Intersection { shot, to_radar, way_back } = shot.as_ref()?;
     let cos_theta = tilted_cos_theta(shot.hit.cos_theta, by)?;
     let shot = Shot { hit: Hit { cos_theta, ..shot.hit }, ..*shot };
-    Some((shot, to_radar.turned(cos_theta)))
+    Some(Intersection { shot, to_radar: to_radar.turned(cos_theta), way_back: *way_back })
 }

@@ -2,8 +2,9 @@
 
 use glam::DVec3;
 
+use super::antenna::Antenna;
 use crate::brdf::widening_rad;
-use crate::frames::{Direction, Global, Pose, Ray, Surface};
+use crate::frames::{Direction, Global, Point, Pose, Ray, Surface};
 use crate::radar::{Chirps, GaussianBeam, Link};
 use crate::trace::{Hit, ScanGeometry};
 
@@ -89,6 +90,8 @@ pub struct Stage<'a> {
     /// Whether shots are rays on the beam's curved wavefront, several in a spot: its curvature then is no part of the divergence
     /// that widens lobes. A single ray along the axis stands for the whole beam.
     pub on_wavefront: bool,
+    /// The antenna that receives the echoes; none for the radar's own.
+    pub antenna: Option<Antenna>,
     /// The pivot of a pose, m, global frame: the [`middle`] of all shots of the scan, even if only some are predicted.
     pub middle: DVec3,
 }
@@ -97,6 +100,11 @@ impl Stage<'_> {
     /// The beam of a shot's chirp.
     pub fn beam(&self, shot: &Shot) -> GaussianBeam {
         self.link.beam.towards(shot.xt_m, shot.yt_m)
+    }
+
+    /// Range of the echo of a hit, m: half of the way to the antenna.
+    pub(crate) fn range_m(&self, radar: Point<Global>, hit: &Hit) -> f64 {
+        self.antenna.map_or(hit.range_m, |antenna| antenna.half_way_m(radar, hit.point))
     }
 
     /// How far a beam of a divergence, rad, widens the lobes of a region, rad.

@@ -82,6 +82,7 @@ impl Bench {
             grain_of_region: &GRAIN,
             seen_lobe_rad: &[],
             on_wavefront: false,
+            antenna: None,
             middle: middle(&self.shots),
         }
     }

@@ -6,6 +6,7 @@ pub mod chirp;
 mod error;
 pub mod f5;
 mod frames;
+pub(crate) mod jones;
 pub mod link;
 pub mod mirror;
 pub mod noise;

@@ -245,10 +245,11 @@ impl Radar {
         noise.gate_cells.or(by_length).map(|cells| cells.max(1.0))
     }
 
-    /// Looks of a cell with noise alone: those of the speckle, or one where noise joins their average or there is no
-    /// speckle.
+    /// Looks of a cell with noise alone: those of the speckle, as of a range receiver, or one where noise joins their
+    /// average or there is no speckle.
     pub fn noise_looks(&self) -> f64 {
         match (self.noise, self.speckle) {
+            (_, Some(speckle)) if self.receiver.is_some() => speckle.looks,
             (Some(Noise { added: Addition::BeforeLooks, .. }), Some(speckle)) => speckle.looks,
             _ => 1.0,
         }

@@ -1,4 +1,4 @@
-//! Applies the effects of a setup to the radar's own echoes.
+//! Applies the effects of a setup to the echoes at an antenna.
 //!
 //! Every ray of a chirp is a [`Shot`], of which a [`Model`] predicts the intersection and the mean power of the single
 //! path. Effects on a whole echo ([`Effect::arrive`](crate::effects::Effect::arrive)) act on the sum over the paths of
@@ -14,12 +14,12 @@ use super::path::Path;
 use super::setup::Setup;
 use super::spot::{Footprints, Intersection};
 use super::surface::Orientation;
-use crate::brdf::{Scattering, Seen};
+use crate::brdf::Seen;
 use crate::effects::{
     Conflict, Level, MeanEcho, Model, PredictionCache, Receiver, Setting, Shot, Stage, middle,
     shot_at, tilted_cos_theta,
 };
-use crate::frames::{Direction, Global, Ray, Surface};
+use crate::frames::{Global, Ray};
 use crate::radar::random::{Key, Purpose};
 use crate::radar::{Channel, Link};
 use crate::trace::{Hit, ScanGeometry};
@@ -27,6 +27,7 @@ use crate::trace::{Hit, ScanGeometry};
 /// The model of a setup, prepared for its scan.
 pub(super) struct EffectScan<'a> {
     setup: Setup<'a>,
+    observer: Observer,
     model: &'a Model<'a>,
     /// The model without effects.
     bare: Model<'a>,
@@ -41,11 +42,12 @@ pub(super) struct EffectScan<'a> {
 }
 
 impl<'a> EffectScan<'a> {
-    /// `None` for a setup without effects.
-    pub fn new(setup: &Setup<'a>) -> Option<EffectScan<'a>> {
+    /// Of the echoes at an antenna; `None` for a setup without effects.
+    pub fn new(setup: &Setup<'a>, observer: Observer) -> Option<EffectScan<'a>> {
         let model = setup.effects?;
         let mut effects = EffectScan {
             setup: *setup,
+            observer,
             model,
             bare: Model { effects: Vec::new(), ..model.clone() },
             link: Link::new(setup.geometry.radar),
@@ -107,11 +109,8 @@ impl<'a> EffectScan<'a> {
                 Path { power_w: with_w / rays as f64, ..path }
             };
         };
-        let retro = Direction::<Surface>::from_angles(shot.hit.theta_rad(), azimuth_rad);
-        let law = self.model.laws.get(usize::from(shot.region));
-        let beam_rad = stage.divergence_rad(&shot);
-        let seen = law.map(|law| law.seen_by(beam_rad, retro, retro));
-        let Seen { specular_share, coherent_share, .. } = seen.unwrap_or_default();
+        let seen = self.model.seen(&stage, &shot, stage.divergence_rad(&shot));
+        let Seen { specular_share, coherent_share, .. } = seen;
         let power_w = with_w / rays as f64;
         Path { power_w, azimuth_rad, specular_share, coherent_share, ..path }
     }
@@ -178,6 +177,7 @@ impl<'a> EffectScan<'a> {
             grain_of_region: &self.grain_of_region,
             seen_lobe_rad: &self.seen_lobe_rad,
             on_wavefront: false,
+            antenna: self.observer.antenna(),
             middle: self.middle,
         }
     }
@@ -261,18 +261,11 @@ fn tilted(shot: &Shot, [along, across]: [f64; 2]) -> Option<Shot> {
     Some(Shot { hit: Hit { cos_theta, ..shot.hit }, ..*shot })
 }
 
-/// Refuses effects that would be counted twice, and effects at a separate receiver.
+/// Refuses effects that would be counted twice, and those without a meaning at the antenna.
 pub(super) fn check(setup: &Setup, rays: usize, observer: Observer) -> Result<(), RenderError> {
     let Some(model) = setup.effects else { return Ok(()) };
-    for (acting, values) in &model.effects {
+    for (acting, _) in &model.effects {
         let effect = acting.about();
-        if observer != Observer::Radar {
-            return Err(RenderError::Effect {
-                effect: effect.name,
-                problem: "acts on the radar's own echoes, and nothing says what it does at another antenna",
-                way_out: "remove [[receiver]], or the effect",
-            });
-        }
         if setup.channel == Channel::CrossPolar {
             return Err(RenderError::Effect {
                 effect: effect.name,
@@ -280,17 +273,12 @@ pub(super) fn check(setup: &Setup, rays: usize, observer: Observer) -> Result<()
                 way_out: "remove radar.polarisation.receive, or the effect",
             });
         }
-        if setup.has_sheets() && (acting.moves() || acting.survey_key(values).is_some()) {
-            return Err(RenderError::Effect {
-                effect: effect.name,
-                problem: "follows rays to the first surface, and some regions let them pass on",
-                way_out: "remove the effect, or `transmits` and `thickness_m` of the regions",
-            });
-        }
         let conflict = effect.conflicts.iter().find(|conflict| match conflict.with {
             Setting::SeveralRays => rays > 1,
             Setting::Bounce => setup.bounce.is_some(),
             Setting::RangeReceiver => setup.geometry.radar.receiver.is_some(),
+            Setting::Sheets => setup.has_sheets(),
+            Setting::OtherAntenna => observer != Observer::Radar,
         });
         if let Some(&Conflict { problem, way_out, .. }) = conflict {
             return Err(RenderError::Effect { effect: effect.name, problem, way_out });

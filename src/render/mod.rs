@@ -31,7 +31,6 @@ mod edges;
 mod error;
 mod facet_steps;
 mod image;
-mod jones;
 mod observer;
 mod path;
 mod paths;

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use crate::effects::Antenna;
 use crate::frames::{Global, Point, Ray};
 
 /// The antenna that receives the echoes.
@@ -26,6 +27,16 @@ impl Observer {
         match self {
             Observer::Radar => 0,
             Observer::Receiver { number, .. } => (*number).into(),
+        }
+    }
+
+    /// The antenna, where it is not the radar's own.
+    pub(super) fn antenna(&self) -> Option<Antenna> {
+        match *self {
+            Observer::Radar => None,
+            Observer::Receiver { position, aperture_m2, .. } => {
+                Some(Antenna { position, aperture_m2 })
+            }
         }
     }
 

@@ -65,7 +65,7 @@ pub fn trace_placed(
     let geometry = &setup.geometry;
     let rays = rays_per_chirp.max(1);
     effect_scan::check(setup, rays, Observer::Radar)?;
-    let footprints = match EffectScan::new(setup) {
+    let footprints = match EffectScan::new(setup, Observer::Radar) {
         None => spot::trace(geometry, rays, done),
         Some(effects) => {
             spot::trace_moved(geometry, rays, done, |chirp, ray, hit| effects.meet(chirp, ray, hit))
@@ -104,7 +104,7 @@ pub fn shade(
     done: &(dyn Fn(usize) + Sync),
 ) -> Result<Scan, RenderError> {
     check(setup, footprints, observer)?;
-    let effects = EffectScan::new(setup);
+    let effects = EffectScan::new(setup, observer);
     let detector = Detector::new(setup, observer, effects.as_ref(), footprints)?;
     let paths = Paths::new(setup, observer, footprints, effects);
     let target_from_global = setup.geometry.radar.frames().global_from_target.inverse();
@@ -147,7 +147,7 @@ pub fn beat_signals<'a>(
     observer: Observer,
 ) -> Result<impl Iterator<Item = Result<Beats, RenderError>> + use<'a>, RenderError> {
     check(setup, footprints, observer)?;
-    let effects = EffectScan::new(setup);
+    let effects = EffectScan::new(setup, observer);
     let detector = Detector::new(setup, observer, effects.as_ref(), footprints)?;
     let paths = Paths::new(setup, observer, footprints, effects);
     let hits = footprints.hits.chunks(footprints.rays_per_chirp.max(1));

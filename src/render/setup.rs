@@ -19,7 +19,7 @@ pub struct Setup<'a> {
     pub surfaces: &'a [Surface<'a>],
     /// Second-order paths; `None`, as in the paper, for single paths only.
     pub bounce: Option<Bounce>,
-    /// Physical effects on the radar's own echoes. The model must have the scattering models of `surfaces`, and the
+    /// Physical effects on the echoes. The model must have the scattering models of `surfaces`, and the
     /// receiver that the radar [declares](crate::effects::Receiver::declared).
     pub effects: Option<&'a Model<'a>>,
     /// The polarisation that the antennas receive.

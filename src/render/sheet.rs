@@ -14,12 +14,12 @@
 use glam::DVec3;
 use nalgebra::Complex;
 
-use super::jones::{Field, Filter};
 use crate::brdf::{
     Brdf, Layer, Layered, NarrowLobe, Polarisation, Scattering, Seen, albedo, mirror_cosine,
 };
 use crate::frames::{Direction, Surface};
 use crate::radar::Radar;
+use crate::radar::jones::{Field, Filter};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// Steps of the table from normal to grazing incidence: a quarter of a degree each.

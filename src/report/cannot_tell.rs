@@ -102,6 +102,11 @@ fn would_help(error: &DiagnoseError) -> &'static str {
         DiagnoseError::Untimed { .. } => {
             "The time of every chirp, as column `time_s` of the file under [radar.scan]."
         }
+        DiagnoseError::OtherAntenna { .. } => "The cloud of the radar's own antenna.",
+        DiagnoseError::RangeReceiver { .. } | DiagnoseError::Radar(_) => {
+            "A scene whose [radar.receiver] is the one that measured."
+        }
+        DiagnoseError::Bounce { .. } => "A scene without [bounce].",
         DiagnoseError::Unranged { .. } => {
             "Ranges, and their standard deviation as `range_sd_m` under [radar.noise] in the scene."
         }

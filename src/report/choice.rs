@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::diagnose::curve::{Term, terms};
-use crate::effects::{Effect, library};
+use crate::effects::{Effect, Setting, library};
 
 /// Why an effect is not tried.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -16,6 +16,12 @@ pub enum Reason {
     /// It moves the target, and the scene declares no error of ranges: the pose is trusted unless ranges speak
     /// against it, and at edges powers alone would move any target.
     NoRanges,
+    /// It changes what comes straight back, and the cloud is that of an antenna apart from the radar's.
+    OtherAntenna,
+    /// It changes the law of speckle or noise, and the scene has a range receiver with laws of its own.
+    RangeReceiver,
+    /// It moves the target, and the scene has second-order paths, which are followed where the scene has the target.
+    Bounce,
     /// The user named other effects.
     NotAsked,
 }
@@ -27,6 +33,13 @@ impl Reason {
             Reason::Declared => "declared already, so at work in the model",
             Reason::NoTimes => "the scan has no times",
             Reason::NoRanges => "the scene states no `range_sd_m` under [radar.noise]",
+            Reason::OtherAntenna => {
+                "they change what comes straight back to the radar, and the cloud is that of another antenna"
+            }
+            Reason::RangeReceiver => "a range receiver has its own speckle and noise",
+            Reason::Bounce => {
+                "they move the target, and [bounce] follows paths on it where the scene has it"
+            }
             Reason::NotAsked => "others were asked for",
         }
     }
@@ -60,6 +73,12 @@ pub struct Measurands {
     pub times: bool,
     /// Ranges with a known error.
     pub ranges: bool,
+    /// Whether all of that is at an antenna apart from the radar's.
+    pub at_other_antenna: bool,
+    /// Whether a range receiver measures all of that.
+    pub by_range_receiver: bool,
+    /// Whether the scene has second-order paths.
+    pub with_bounce: bool,
 }
 
 /// The library of effects, sorted for one scan.
@@ -98,7 +117,14 @@ impl Choice {
     /// A sentence for every reason other than the user's choice for which effects are left out.
     pub fn notices(&self) -> Vec<String> {
         let mut notices = Vec::new();
-        for reason in [Reason::Declared, Reason::NoTimes, Reason::NoRanges] {
+        for reason in [
+            Reason::Declared,
+            Reason::OtherAntenna,
+            Reason::RangeReceiver,
+            Reason::Bounce,
+            Reason::NoTimes,
+            Reason::NoRanges,
+        ] {
             let names = self.left_out(reason).join(", ");
             if !names.is_empty() {
                 notices.push(format!("not tried ({}): {names}", reason.words()));
@@ -114,10 +140,17 @@ fn reason_against(
     declared: &[&str],
     measured: Measurands,
 ) -> Option<Reason> {
+    let about = effect.about();
     if declared.contains(&effect.name()) {
         Some(Reason::Declared)
     } else if !is_asked {
         Some(Reason::NotAsked)
+    } else if measured.at_other_antenna && about.is_excluded_by(Setting::OtherAntenna) {
+        Some(Reason::OtherAntenna)
+    } else if measured.by_range_receiver && about.is_excluded_by(Setting::RangeReceiver) {
+        Some(Reason::RangeReceiver)
+    } else if measured.with_bounce && about.is_excluded_by(Setting::Bounce) {
+        Some(Reason::Bounce)
     } else if !measured.times && effect.depends_on_time() {
         Some(Reason::NoTimes)
     } else if !measured.ranges && effect.moves() {
@@ -146,12 +179,26 @@ mod tests {
     #[test]
     fn every_effect_is_tried_or_has_a_reason() {
         let asked = ["fov-gain", "drift", "pose", "motion"].map(|name| find(name).unwrap());
-        let choice = Choice::new(&asked, &["pose"], Measurands { times: true, ranges: false });
+        let all = Measurands {
+            times: true,
+            ranges: true,
+            at_other_antenna: false,
+            by_range_receiver: false,
+            with_bounce: false,
+        };
+        let choice = Choice::new(&asked, &["pose"], Measurands { ranges: false, ..all });
         assert_eq!(choice.left_out(Reason::NoRanges), ["motion"]);
-        let choice = Choice::new(&asked, &["pose"], Measurands { times: false, ranges: true });
+        let choice = Choice::new(&asked, &["pose"], Measurands { times: false, ..all });
         assert_eq!(choice.tried[0].name(), "fov-gain");
         assert_eq!(choice.left_out(Reason::Declared), ["pose"]);
         assert_eq!(choice.left_out(Reason::NoTimes), ["motion", "drift"]);
         assert_eq!(choice.tried.len() + choice.not_tried.len(), library().len());
+        let choice = Choice::new(&library(), &[], Measurands { at_other_antenna: true, ..all });
+        let tried: Vec<&str> = choice.tried.iter().map(|effect| effect.name()).collect();
+        assert!(asked.iter().all(|effect| tried.contains(&effect.name())), "{tried:?}");
+        assert!(choice.left_out(Reason::OtherAntenna).contains(&"subsurface"));
+        let bounced = Measurands { with_bounce: true, ..all };
+        let choice = Choice::new(&library(), &["multi-bounce"], bounced);
+        assert_eq!(choice.left_out(Reason::Bounce), ["pose", "motion"]);
     }
 }

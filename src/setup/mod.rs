@@ -28,4 +28,4 @@ pub use materials::{
 };
 pub use scene::{Assembly, ReadyScene, SceneMaterial, resolve_effects};
 pub use validity::{ValidityWarning, unmet_conditions, unmet_sentence};
-pub use view::View;
+pub use view::{View, antenna};

@@ -3,10 +3,11 @@
 use glam::DVec3;
 
 use super::scene::Assembly;
+use crate::effects::Antenna;
 use crate::error::Error;
 use crate::frames::Point;
-use crate::radar::Channel;
 use crate::radar::polarisation::Receive;
+use crate::radar::{Channel, Radar};
 use crate::render::{Footprints, Observer, Scan, Setup, shade, trace_placed};
 use crate::scene::file::ReceiverEntry;
 
@@ -34,6 +35,14 @@ impl View<'_> {
             None => format!("{channel}{stem}.{extension}"),
             Some(receiver) => format!("{channel}{stem}-{}.{extension}", receiver.name),
         }
+    }
+}
+
+/// The antenna of a receiver: with the area that it states, or else that of the radar.
+pub fn antenna(receiver: &ReceiverEntry, radar: &Radar) -> Antenna {
+    Antenna {
+        position: Point::from(DVec3::from_array(receiver.position_m)),
+        aperture_m2: receiver.aperture_m2.or(radar.aperture_m2),
     }
 }
 
@@ -100,11 +109,8 @@ impl<'a> Assembly<'a> {
         let channel = setup.channel;
         let mut views = vec![View { receiver: None, observer: Observer::Radar, channel, scan }];
         for (number, receiver) in (1u32..).zip(&ready.scene.file.receiver) {
-            let observer = Observer::Receiver {
-                number,
-                position: Point::from(DVec3::from_array(receiver.position_m)),
-                aperture_m2: receiver.aperture_m2.or(ready.scene.radar().aperture_m2),
-            };
+            let Antenna { position, aperture_m2 } = antenna(receiver, ready.scene.radar());
+            let observer = Observer::Receiver { number, position, aperture_m2 };
             let scan = shade(setup, footprints, observer, advance).map_err(|error| {
                 ready.render_error(&format!("receiver `{}`: ", receiver.name), error)
             })?;

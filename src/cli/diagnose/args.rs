@@ -29,6 +29,9 @@ pub struct Args {
     /// one for all
     #[arg(long, value_name = "SCENE")]
     pub scene: Vec<PathBuf>,
+    /// The receiver of the scene that the cloud is of, as in cloud-NAME.ply [default: the radar itself]
+    #[arg(long, value_name = "NAME", conflicts_with = "curve")]
+    pub receiver: Option<String>,
     /// Instead of a cloud: a backscatter curve (.csv of `matdb measure`), a table in the plane of
     /// incidence (.csv: theta_i_deg,theta_s_deg,brdf_per_sr) or a .bsdf
     #[arg(long, value_name = "FILE")]

@@ -36,6 +36,7 @@ pub(super) fn run(
         cloud: &cloud.cloud,
         scene: scenes[0],
         further: &further,
+        receiver: args.receiver.as_deref(),
         effects: &effects,
         material: args.material.as_deref(),
         seed: args.seed,

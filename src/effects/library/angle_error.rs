@@ -1,6 +1,6 @@
 //! Normals that differ from the mesh's from chirp to chirp: two Gaussian tilts of one spread.
 
-use crate::effects::effect::{About, Effect, EffectParameter, Level};
+use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level};
 use crate::effects::receiver::Receiver;
 use crate::effects::shot::{Shot, Stage};
 
@@ -19,7 +19,7 @@ const ABOUT: About = About {
          is steep. A rougher surface broadens the lobe without the scatter; speckle widens the \
          scatter alike at every angle.",
     parameters: &[EffectParameter::new("sd_deg", "deg", [0.0, 20.0], 0.0, 1.0)],
-    conflicts: &[],
+    conflicts: &[Conflict::OF_BACKSCATTER],
 };
 
 impl Effect for AngleError {

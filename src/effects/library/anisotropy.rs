@@ -1,7 +1,7 @@
 //! Facet slopes that differ along and across a grain: m·√q along it and m/√q across.
 
 use crate::brdf::{Brdf, CookTorrance, Scattering};
-use crate::effects::effect::{About, Effect, EffectParameter, Level};
+use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level};
 use crate::effects::lobes::rescaled;
 use crate::effects::shot::{Shot, Stage};
 use crate::frames::Direction;
@@ -35,7 +35,7 @@ const ABOUT: About = About {
         EffectParameter::new("ratio", "1", [0.1, 10.0], 1.0, 0.1),
         EffectParameter::new("turn_deg", "deg", [-90.0, 90.0], 0.0, 10.0),
     ],
-    conflicts: &[],
+    conflicts: &[Conflict::OF_BACKSCATTER],
 };
 
 impl Effect for Anisotropy {

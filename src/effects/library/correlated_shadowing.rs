@@ -1,7 +1,7 @@
 //! Shadowing and masking as one event: in backscatter G1 where the law has G1².
 
 use crate::brdf::{Brdf, CookTorrance, Scattering, Shadowing};
-use crate::effects::effect::{About, Effect, EffectParameter, Level};
+use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level};
 use crate::effects::lobes::rescaled;
 use crate::effects::shot::{Shot, Stage};
 
@@ -16,7 +16,7 @@ const ABOUT: About = About {
          happens on smooth ones. Return from below the surface has one level in σ⁰ instead of a \
          factor that grows with angle, and needs no rough lobe.",
     parameters: &[EffectParameter::new("share", "1", [0.0, 1.0], 0.0, 0.25)],
-    conflicts: &[],
+    conflicts: &[Conflict::OF_BACKSCATTER],
 };
 
 impl Effect for CorrelatedShadowing {

@@ -1,7 +1,7 @@
 //! A layer over part of the target, such as clothing: −loss/cos θ dB beyond a line across the field of
 //! view, which is a plane through the radar, or within an oval outline, a cone from the radar.
 
-use crate::effects::effect::{About, Effect, EffectParameter, Level};
+use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level};
 use crate::effects::place::{Place, along_m, cells_with_shots};
 use crate::effects::shot::{Shot, Stage};
 use crate::units::ratio_from_db;
@@ -61,7 +61,7 @@ const ABOUT: About = About {
          patch has the same offset at all angles; a gain over the field and a \
          drift change without an edge. A layer over everything cannot be told from the calibration.",
     parameters: &PARAMETERS,
-    conflicts: &[],
+    conflicts: &[Conflict::OF_BACKSCATTER],
 };
 
 impl Effect for CoveringLayer {

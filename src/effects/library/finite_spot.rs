@@ -367,11 +367,15 @@ const ABOUT: About = About {
          places far from edges are right. A rougher surface or an error of the angle broadens the lobe \
          on flat places too.",
     parameters: &[EffectParameter::new("diameter_m", "m", [0.0, MOST_M], 0.0, 0.008)],
-    conflicts: &[Conflict {
-        with: Setting::SeveralRays,
-        problem: "averages over the spot, and so do several rays",
-        way_out: "set spot.rays = 1, or remove the effect",
-    }],
+    conflicts: &[
+        Conflict {
+            with: Setting::SeveralRays,
+            problem: "averages over the spot, and so do several rays",
+            way_out: "set spot.rays = 1, or remove the effect",
+        },
+        Conflict::OF_SHEETS,
+        Conflict::OF_BACKSCATTER,
+    ],
 };
 
 impl Effect for FiniteSpot {

@@ -107,7 +107,7 @@ const ABOUT: About = About {
          mirror passes twice disagree. A wrong pose is off alike from the first chirp to the last; a \
          drift of the gain leaves the ranges as they are.",
     parameters: &PARAMETERS,
-    conflicts: &[Conflict::OF_MOTION],
+    conflicts: &[Conflict::OF_MOTION, Conflict::OF_SHEETS],
 };
 
 impl Effect for Motion {

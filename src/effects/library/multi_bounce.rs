@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 
 use rayon::prelude::*;
 
-use crate::brdf::{Brdf, Distribution, NarrowLobe, Scattering};
+use crate::brdf::{Brdf, Distribution, NarrowLobe, Scattering, Seen};
 use crate::effects::echo::MeanEcho;
 use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level, Setting, Survey};
 use crate::effects::intersection::{local_frame, shot_along};
@@ -24,6 +24,20 @@ use crate::trace::LocalFrame;
 use crate::units::ratio_from_db;
 
 pub(crate) struct MultiBounce;
+
+/// The second-order paths that a scene with `[bounce]` has. They have no number to be found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SecondBounce {
+    /// Power by way of a surface outside the spot, over one inside, as a ratio.
+    pub outside_spot: f64,
+    /// Whether both ways round a pair of surfaces add as waves, which doubles what is not coherent.
+    pub in_phase: bool,
+}
+
+impl SecondBounce {
+    /// What is assumed without `[bounce]`.
+    const ASSUMED: SecondBounce = SecondBounce { outside_spot: OUTSIDE_SPOT, in_phase: false };
+}
 
 /// A coupling that counts as none, dB.
 const NONE_DB: f64 = -60.0;
@@ -79,7 +93,7 @@ struct Detour {
     /// Power received, W, where the second f is 1/sr and the first one, too, and the antenna sees the second surface as
     /// well as the first; of a mirrored path where the first surface sends on all that it receives.
     watts: f64,
-    /// How well the beam sees the second surface, as a share of the power on its axis.
+    /// How well the beam with its side lobes sees the second surface, as a share of the power on its axis.
     pattern: f64,
     /// Distance of the second surface from the axis of the beam, m.
     beside_m: f64,
@@ -90,26 +104,36 @@ struct Detour {
 }
 
 impl Detour {
-    fn power_w(&self, laws: &[Brdf]) -> f64 {
+    fn power_w(&self, laws: &[Brdf], in_phase: bool) -> f64 {
         let [first, second] = self.regions.map(|region| laws.get(usize::from(region)));
         let (Some(first), Some(second)) = (first, second) else { return 0.0 };
         let [i, o] = self.first;
         if !self.is_mirrored {
+            let first = first.apart_from_narrow_lobes(i, o);
             return self.watts
-                * first.apart_from_narrow_lobes(i, o).f_per_sr
-                * self.received_per_sr(second, 0.0);
+                * first.f_per_sr
+                * self.received_per_sr(second, first, 0.0, in_phase);
         }
         let mut power_w = 0.0;
         for NarrowLobe { share, m } in first.narrow_lobes(i) {
-            power_w += self.watts * share * self.received_per_sr(second, m);
+            let first = Seen::mirror(0.0);
+            power_w += self.watts * share * self.received_per_sr(second, first, m, in_phase);
         }
         power_w
     }
 
-    /// f of the second surface, 1/sr, as the beam sees it by way of a lobe of the roughness m.
-    fn received_per_sr(&self, law: &Brdf, m: f64) -> f64 {
-        let [i, o] = self.second;
-        law.seen_by(self.beam_rad.hypot(m), i, o).f_per_sr
+    /// f of the second surface, 1/sr, as the beam sees it by way of a lobe of the roughness m, with what the same way round
+    /// the other way adds.
+    fn received_per_sr(&self, law: &Brdf, first: Seen, m: f64, in_phase: bool) -> f64 {
+        let ([i, o], beam_rad) = (self.second, self.beam_rad.hypot(m));
+        let last = law.seen_by(beam_rad, i, o);
+        if !in_phase {
+            return last.f_per_sr;
+        }
+        // The coherent part is one wave already.
+        let narrowed = (self.beam_rad / beam_rad).powi(2);
+        let coherent_share = first.coherent_share * last.coherent_share * narrowed;
+        last.f_per_sr * (2.0 - coherent_share)
     }
 }
 
@@ -121,6 +145,7 @@ fn detour(
     frame: &LocalFrame,
     o: Direction<Surface>,
     density_per_sr: Option<f64>,
+    outside_spot: f64,
 ) -> Option<Detour> {
     let onward = frame.world(o.xyz());
     let start = shot.hit.point.xyz + CLEARANCE_M * shot.normal;
@@ -131,7 +156,7 @@ fn detour(
     let beam = stage.beam(shot);
     let pattern = beam.pattern(&shot.ray, 1, second.hit.point);
     // In the main lobe the antenna sees along the normal of its wavefront.
-    let back = if pattern > OUTSIDE_SPOT {
+    let back = if pattern > outside_spot {
         -beam.direction_at(&shot.ray, second.hit.point)
     } else {
         to_radar
@@ -156,7 +181,7 @@ fn detour(
         second: [there.local(-onward), there.local(back.xyz())],
         is_mirrored: density_per_sr.is_none(),
         watts: sent_w * cos_exit * solid_angle_sr,
-        pattern,
+        pattern: pattern.max(outside_spot),
         beside_m: (second.hit.point.xyz - radar.xyz).reject_from(shot.ray.direction.xyz()).length(),
         beam_rad: beam.divergence_rad(),
         range_m: (shot.hit.range_m + way_m) / 2.0,
@@ -164,13 +189,13 @@ fn detour(
 }
 
 /// All paths of a chirp by way of second surfaces, on the target as the scene has it.
-fn detours(stage: &Stage, shot: &Shot) -> Vec<Detour> {
+fn detours(stage: &Stage, shot: &Shot, outside_spot: f64) -> Vec<Detour> {
     let Some(shot) = &shot_along(stage, shot, shot.ray) else { return Vec::new() };
     let frame = local_frame(stage, shot);
     let i = frame.local(-shot.ray.direction.xyz());
     let drawn = onward(i).map(|(o, density_per_sr)| (o, Some(density_per_sr)));
     let all = drawn.chain([(i.mirrored(), None)]);
-    all.filter_map(|(o, density_per_sr)| detour(stage, shot, &frame, o, density_per_sr)).collect()
+    all.filter_map(|(o, per_sr)| detour(stage, shot, &frame, o, per_sr, outside_spot)).collect()
 }
 
 /// What a path by way of a second surface returns by the laws of the two.
@@ -182,14 +207,15 @@ struct Bounce {
 }
 
 impl Bounce {
-    fn new(laws: &[Brdf], detour: &Detour) -> Bounce {
+    fn new(laws: &[Brdf], detour: &Detour, in_phase: bool) -> Bounce {
         let Detour { pattern, beside_m, range_m, .. } = *detour;
-        Bounce { echo: MeanEcho::at_once(detour.power_w(laws), range_m), pattern, beside_m }
+        let echo = MeanEcho::at_once(detour.power_w(laws, in_phase), range_m);
+        Bounce { echo, pattern, beside_m }
     }
 
     /// The echo through an antenna of this reach, m.
     fn seen(&self, reach_m: f64) -> MeanEcho {
-        let mut seen = self.pattern.max(OUTSIDE_SPOT);
+        let mut seen = self.pattern;
         if reach_m > 0.0 {
             seen = seen.max((-self.beside_m / reach_m).exp());
         }
@@ -211,11 +237,15 @@ const ABOUT: About = About {
         EffectParameter::new("coupling_db", "dB", [NONE_DB, 30.0], NONE_DB, 1.0),
         EffectParameter::new("reach_m", "m", [0.0, 0.5], 0.0, 0.01),
     ],
-    conflicts: &[Conflict {
-        with: Setting::Bounce,
-        problem: "brings echoes by way of a second surface, and so does [bounce]",
-        way_out: "remove one of the two",
-    }],
+    conflicts: &[
+        Conflict {
+            with: Setting::Bounce,
+            problem: "brings echoes by way of a second surface, and so does [bounce]",
+            way_out: "remove one of the two",
+        },
+        Conflict::OF_SHEETS,
+        Conflict::OF_BACKSCATTER,
+    ],
 };
 
 impl Effect for MultiBounce {
@@ -241,27 +271,60 @@ impl Effect for MultiBounce {
     }
 
     fn survey(&self, _: &[f64], stage: &Stage, shots: &[Shot]) -> Survey {
-        let all: Vec<Vec<Detour>> = shots.par_iter().map(|shot| detours(stage, shot)).collect();
-        Box::new(all)
+        SecondBounce::ASSUMED.survey(&[], stage, shots)
     }
 
     fn shade(&self, survey: &Survey, laws: &[Brdf]) -> Survey {
-        let all = survey.downcast_ref::<Vec<Vec<Detour>>>().map_or(&[][..], Vec::as_slice);
-        let of_shot =
-            |detours: &Vec<Detour>| detours.iter().map(|one| Bounce::new(laws, one)).collect();
-        Box::new(all.par_iter().map(of_shot).collect::<Vec<Vec<Bounce>>>())
+        SecondBounce::ASSUMED.shade(survey, laws)
     }
 
     fn arrive(&self, values: &[f64], shaded: &Survey, arrived: &mut [Option<MeanEcho>]) {
         let &[coupling_db, reach_m] = values else { return };
-        let coupling = ratio_from_db(coupling_db);
-        let all = shaded.downcast_ref::<Vec<Vec<Bounce>>>().map_or(&[][..], Vec::as_slice);
-        all.par_iter().zip(arrived).for_each(|(bounces, one)| {
-            let seen = bounces.iter().map(|bounce| bounce.seen(reach_m)).reduce(MeanEcho::with);
-            if let (Some(one), Some(seen)) = (one, seen) {
-                *one = one.with(MeanEcho { power_w: coupling * seen.power_w, ..seen });
-            }
-        });
+        add(ratio_from_db(coupling_db), reach_m, shaded, arrived);
+    }
+}
+
+/// Adds what comes by way of second surfaces, times a ratio, through an antenna of a reach, m.
+fn add(coupling: f64, reach_m: f64, shaded: &Survey, arrived: &mut [Option<MeanEcho>]) {
+    let all = shaded.downcast_ref::<Vec<Vec<Bounce>>>().map_or(&[][..], Vec::as_slice);
+    all.par_iter().zip(arrived).for_each(|(bounces, one)| {
+        let seen = bounces.iter().map(|bounce| bounce.seen(reach_m)).reduce(MeanEcho::with);
+        if let (Some(one), Some(seen)) = (one, seen) {
+            *one = one.with(MeanEcho { power_w: coupling * seen.power_w, ..seen });
+        }
+    });
+}
+
+const ABOUT_SECOND: About = About { parameters: &[], conflicts: &[], ..ABOUT };
+
+impl Effect for SecondBounce {
+    fn about(&self) -> &About {
+        &ABOUT_SECOND
+    }
+
+    fn starts(&self, _stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
+        vec![Vec::new()]
+    }
+
+    fn survey_key(&self, _values: &[f64]) -> Option<Vec<f64>> {
+        Some(Vec::new())
+    }
+
+    fn survey(&self, _: &[f64], stage: &Stage, shots: &[Shot]) -> Survey {
+        let all = shots.par_iter().map(|shot| detours(stage, shot, self.outside_spot));
+        Box::new(all.collect::<Vec<Vec<Detour>>>())
+    }
+
+    fn shade(&self, survey: &Survey, laws: &[Brdf]) -> Survey {
+        let all = survey.downcast_ref::<Vec<Vec<Detour>>>().map_or(&[][..], Vec::as_slice);
+        let of_shot = |detours: &Vec<Detour>| {
+            detours.iter().map(|one| Bounce::new(laws, one, self.in_phase)).collect()
+        };
+        Box::new(all.par_iter().map(of_shot).collect::<Vec<Vec<Bounce>>>())
+    }
+
+    fn arrive(&self, _: &[f64], shaded: &Survey, arrived: &mut [Option<MeanEcho>]) {
+        add(1.0, 0.0, shaded, arrived);
     }
 }
 
@@ -312,11 +375,30 @@ mod tests {
     #[test]
     fn the_pattern_falls_by_a_factor_of_e_over_the_reach() {
         let echo = MeanEcho::at_once(2.0, 8.0);
-        let bounce = Bounce { echo, pattern: 1e-4, beside_m: 0.12 };
+        let bounce = Bounce { echo, pattern: OUTSIDE_SPOT, beside_m: 0.12 };
         assert!((bounce.seen(0.06).power_w - 2.0 * (-2.0f64).exp()).abs() < 1e-12);
         assert_eq!(bounce.seen(0.02).power_w, 2.0 * OUTSIDE_SPOT);
         let inside = Bounce { pattern: 0.5, ..bounce };
         assert_eq!(inside.seen(0.06).power_w, 1.0);
+    }
+
+    #[test]
+    fn side_lobes_and_both_ways_in_phase_have_their_factors() {
+        let corner = Bench::of(dihedral());
+        let bare = corner.bare();
+        let added_w = |outside_spot, in_phase| -> f64 {
+            let with = corner.with(&SecondBounce { outside_spot, in_phase }, &[]);
+            with.iter().zip(&bare).map(|(with, bare)| with.power_w - bare.power_w).sum()
+        };
+        let assumed_w: f64 =
+            corner.with(&MultiBounce, &[0.0, 0.0]).iter().map(|one| one.power_w).sum();
+        let bare_w: f64 = bare.iter().map(|one| one.power_w).sum();
+        assert!((added_w(OUTSIDE_SPOT, false) / (assumed_w - bare_w) - 1.0).abs() < 1e-9);
+        // No part of a rough lobe is one wave.
+        assert!((added_w(OUTSIDE_SPOT, true) / added_w(OUTSIDE_SPOT, false) - 2.0).abs() < 1e-3);
+        // Almost all second surfaces lie outside of the spot.
+        let ratio = added_w(0.1 * OUTSIDE_SPOT, false) / added_w(OUTSIDE_SPOT, false);
+        assert!((0.09..0.9).contains(&ratio), "{ratio}");
     }
 
     /// ∫ cos θ dω over the hemisphere is π.

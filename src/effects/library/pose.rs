@@ -39,7 +39,7 @@ const ABOUT: About = About {
          wrong: too strong on one side of the brightest place and too weak on the other. Edges have \
          hits where none should be. Motion does the same, but changes along the scan.",
     parameters: &PARAMETERS,
-    conflicts: &[Conflict::OF_MOTION],
+    conflicts: &[Conflict::OF_MOTION, Conflict::OF_SHEETS],
 };
 
 impl Effect for Pose {

@@ -6,7 +6,7 @@
 use std::f64::consts::PI;
 
 use crate::brdf::Brdf;
-use crate::effects::effect::{About, Effect, EffectParameter, Level};
+use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level};
 use crate::effects::shot::{Shot, Stage};
 
 pub(crate) struct Subsurface;
@@ -26,7 +26,7 @@ const ABOUT: About = About {
         EffectParameter::new("sigma_v", "1", [0.0, 1.0], 0.0, 5e-4),
         EffectParameter::new("cosine_power", "1", [0.0, 4.0], 0.0, 0.5),
     ],
-    conflicts: &[],
+    conflicts: &[Conflict::OF_BACKSCATTER],
 };
 
 impl Effect for Subsurface {

@@ -9,7 +9,7 @@
 //! ratio, since backscatter alone does not determine f_λ.
 
 use crate::brdf::{Brdf, Fresnel, Layer, Layered, Scattering, ScatteringModel, mirror_cosine};
-use crate::effects::effect::{About, Effect, EffectParameter, Level};
+use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level};
 use crate::effects::shot::{Shot, Stage};
 
 pub(crate) struct ThinFilm;
@@ -61,7 +61,7 @@ const ABOUT: About = About {
         EffectParameter::new("from_below", "1", [0.0, 1.0], 1.0, 0.2),
         EffectParameter::new("substrate_ratio", "1", [0.5, 5.0], 1.0, 0.1),
     ],
-    conflicts: &[],
+    conflicts: &[Conflict::OF_BACKSCATTER],
 };
 
 impl Effect for ThinFilm {

@@ -12,7 +12,7 @@ use num_complex::Complex;
 
 /// The complex electric field of a wave, of unit power where it was sent.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Field {
+pub(crate) struct Field {
     real: DVec3,
     imaginary: DVec3,
 }
@@ -66,7 +66,7 @@ impl Field {
 
 /// What sheets on a straight way do to a field: a complex matrix over the axes of the global frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Filter {
+pub(crate) struct Filter {
     real: DMat3,
     imaginary: DMat3,
 }
