@@ -149,12 +149,18 @@ fn what_the_renderer_follows_is_no_effect() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fs::write(at.join("several.toml"), &several).unwrap();
-    fs::write(at.join("scene.toml"), SCENE).unwrap();
+    fs::write(at.join("scene.toml"), format!("{SCENE}{LEFT}")).unwrap();
     matdb(at).args(["render", "-q", "several.toml", "-o", "out"]).assert().success();
-    let arguments = ["diagnose", "-q", "out/cloud.ply", "--scene", "scene.toml", "-o", "answer"];
-    matdb(at).args(arguments).args(["--effects", "finite-spot,subsurface"]).assert().success();
+    let arguments = ["diagnose", "out/cloud.ply", "--scene", "scene.toml", "-o", "answer"];
+    let answer = matdb(at).args(arguments).args(["--effects", "finite-spot,subsurface"]).assert();
+    let answer = answer.success();
     let report = json(&at.join("answer/report.json"));
     assert_eq!(report["effects"][0]["name"], "finite-spot", "{report}");
+    // It has no meaning at another antenna, without which the scene after can be rendered.
+    let said = String::from_utf8_lossy(&answer.get_output().stderr);
+    assert!(said.contains("has no [[receiver]]: nothing says what finite-spot does"), "{said}");
+    matdb(at).args(["add", "--from", "answer/material-mannequin-paint.toml"]).assert().success();
+    matdb(at).args(["render", "-q", "answer/after.toml", "-o", "after"]).assert().success();
 }
 
 /// Diagnoses a cloud of the folder and gives the report.
@@ -181,13 +187,15 @@ fn assert_drift(report: &Value) {
     assert!((number(&slope["value"]) - 2.0).abs() < 3.0 * number(&slope["sd"]), "{slope}");
 }
 
+/// An antenna apart from the radar's.
+const LEFT: &str = "[[receiver]]\nname = \"left\"\nposition_m = [-3.0, 1.3, 5.0]\n";
+
 /// An antenna apart from the radar's sees f(i, o) where the target does not stand between.
 #[test]
 fn the_cloud_of_another_antenna_has_its_own_prediction() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let left = "[[receiver]]\nname = \"left\"\nposition_m = [-3.0, 1.3, 5.0]\n";
-    let scene = format!("{SCENE}{left}");
+    let scene = format!("{SCENE}{LEFT}");
     render(at, "scene", &scene);
     render(at, "drift", &format!("{scene}{DRIFT}"));
     let of_left = ["--receiver", "left", "--effects", "fov-gain,drift,pose"];
@@ -205,6 +213,9 @@ fn the_cloud_of_another_antenna_has_its_own_prediction() {
     assert!(of_left(["--receiver", "right", "--seed", "1"]).contains("name one of left"));
     let message = of_left(["--receiver", "left", "--effects", "subsurface"]);
     assert!(message.contains("subsurface") && message.contains("another antenna"), "{message}");
+    let two = ["diagnose", "scene/cloud-left.ply", "drift/cloud-left.ply", "--scene", "scene.toml"];
+    let message = refused(matdb(at).args(two).args(["--receiver", "left", "-o", "x"]));
+    assert!(message.contains("has one cloud, and 2 are given"), "{message}");
 }
 
 /// Side lobes that the scene states, and both ways round a pair of surfaces in phase.
@@ -221,6 +232,10 @@ fn a_bounce_has_the_side_lobes_and_phases_of_its_scene() {
     let complete = diagnosed(at, "scene/cloud.ply", "scene.toml", &effects);
     assert_eq!(complete["verdict"], "no-missing-effect", "{}", complete["effects"]);
     assert_drift(&diagnosed(at, "drift/cloud.ply", "scene.toml", &effects));
+    // The renderer follows these paths on the target where the scene has it.
+    let arguments = ["diagnose", "scene/cloud.ply", "--scene", "scene.toml", "-o", "x"];
+    let message = refused(matdb(at).args(arguments).args(["--effects", "drift,pose"]));
+    assert!(message.contains("pose") && message.contains("remove [bounce]"), "{message}");
 }
 
 /// The strongest peak of the spectrum, whose noise and threshold are those of the range receiver.
