@@ -118,6 +118,7 @@ def main():
     parser.add_argument("--count", type=int, default=10**9, help="at most so many curves of each group")
     parser.add_argument("--again", action="store_true", help="forget the stored results")
     parser.add_argument("--minutes", type=float, default=1e9, help="start no curve after this time")
+    parser.add_argument("--strict", action="store_true", help="exit with 1 unless every curve is good")
     parser.add_argument("--only-table", action="store_true", help="print what is stored")
     parser.add_argument("--extra", nargs=argparse.REMAINDER, default=[], help="further options of matdb fit")
     a = parser.parse_args()
@@ -139,6 +140,8 @@ def main():
                 file.write(json.dumps(results[-1]) + "\n")
     table(results)
     misses(results)
+    if a.strict and (not results or any(r["kind"] != "good" for r in results)):
+        raise SystemExit(1)
 
 
 if __name__ == "__main__":

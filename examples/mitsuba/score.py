@@ -152,6 +152,7 @@ def main():
     parser.add_argument("--matdb", default="matdb")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--strict", action="store_true", help="exit with 1 unless every case is right")
     arguments = parser.parse_args()
     names = sorted(n for n in os.listdir(arguments.folder) if n.startswith("case-"))
     truths = {}
@@ -209,6 +210,8 @@ def main():
         print(f"not in the data (the true form itself is expected to gain less than {IN_THE_DATA:g} in ln p):")
         for m in apart:
             print(" ", m)
+    if arguments.strict and (not names or right != total):
+        raise SystemExit(1)
 
 
 if __name__ == "__main__":

@@ -117,7 +117,7 @@ impl<'p> Search<'p> {
             .into_par_iter()
             .filter_map(|effect| self.promise(state, &screen, *effect, round))
             .collect();
-        leave_needless_members(&mut trials);
+        self.leave_needless_members(&mut trials);
         sort(&mut trials);
         self.scout_promising(state, &screen, &mut trials, round);
         sort(&mut trials);
@@ -146,6 +146,21 @@ impl<'p> Search<'p> {
     fn screen(&self, state: &State) -> Screen<'p> {
         let problem = self.sample.problem(&self.scorer.problem);
         Screen::new(problem, &state.space, &state.fit.at)
+    }
+
+    /// Leaves out members of motions that promise too little by themselves and no more than simpler ones of their family.
+    fn leave_needless_members(&self, trials: &mut Vec<Trial>) {
+        let settings = self.scorer.settings;
+        let is_needless = |one: &Trial| {
+            let Candidate { name, numbers, gain, .. } = one.candidate;
+            // What promises nothing is of infinite worth, so that one of them is tried all the same.
+            let promises = gain.is_finite() && gain >= settings.least_gain_of(numbers, one.tried);
+            let mut family = trials.iter().filter(|other| other.candidate.name == name);
+            !promises && family.any(|other| other.is_enough_for(one))
+        };
+        let needless: Vec<bool> = trials.iter().map(is_needless).collect();
+        let mut needless = needless.into_iter();
+        trials.retain(|_| !needless.next().unwrap_or(false));
     }
 
     /// Fits those trials to the sample that promise enough.
@@ -420,17 +435,6 @@ fn of_all_strengths(effect: &dyn Effect, start: &DVector<f64>) -> [DVector<f64>;
         }
         at
     })
-}
-
-/// Leaves out members of motions that promise no more than simpler ones of their family.
-fn leave_needless_members(trials: &mut Vec<Trial>) {
-    let is_needless = |one: &Trial| {
-        let mut family = trials.iter().filter(|other| other.candidate.name == one.candidate.name);
-        family.any(|other| other.is_enough_for(one))
-    };
-    let needless: Vec<bool> = trials.iter().map(is_needless).collect();
-    let mut needless = needless.into_iter();
-    trials.retain(|_| !needless.next().unwrap_or(false));
 }
 
 /// Sorts trials by their gain, best first.
