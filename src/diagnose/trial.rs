@@ -62,15 +62,13 @@ pub(super) struct Trial<'a> {
 
 impl Trial<'_> {
     /// Whether this motion of the target makes another with more parameters needless: each of those must gain 1 in ln p
-    /// (Akaike, IEEE Trans. Autom. Control 19, 1974). A pose is the constant case of a motion. Where neither promises
-    /// anything, the simpler one is tried.
+    /// (Akaike, IEEE Trans. Autom. Control 19, 1974). A pose is the constant case of a motion.
     pub fn is_enough_for(&self, flexible: &Trial) -> bool {
         let [few, many] = [self, flexible].map(|trial| trial.candidate.numbers as f64);
         let more = flexible.candidate.gain - self.candidate.gain;
-        let gains_little = more.is_nan() || more < many - few;
         let move_alike = self.effect.moves() && flexible.effect.moves();
         let [own, other] = [self, flexible].map(|trial| &trial.candidate.scans);
-        move_alike && own == other && few < many && gains_little
+        move_alike && own == other && few < many && more < many - few
     }
 
     /// Name and scans of its effect, which all members of a family share.
@@ -117,7 +115,6 @@ impl<'p> Search<'p> {
             .into_par_iter()
             .filter_map(|effect| self.promise(state, &screen, *effect, round))
             .collect();
-        self.leave_needless_members(&mut trials);
         sort(&mut trials);
         self.scout_promising(state, &screen, &mut trials, round);
         sort(&mut trials);
@@ -148,25 +145,16 @@ impl<'p> Search<'p> {
         Screen::new(problem, &state.space, &state.fit.at)
     }
 
-    /// Leaves out members of motions that promise too little by themselves and no more than simpler ones of their family.
-    fn leave_needless_members(&self, trials: &mut Vec<Trial>) {
-        let settings = self.scorer.settings;
-        let is_needless = |one: &Trial| {
-            let Candidate { name, numbers, gain, .. } = one.candidate;
-            // What promises nothing is of infinite worth, so that one of them is tried all the same.
-            let promises = gain.is_finite() && gain >= settings.least_gain_of(numbers, one.tried);
-            let mut family = trials.iter().filter(|other| other.candidate.name == name);
-            !promises && family.any(|other| other.is_enough_for(one))
-        };
-        let needless: Vec<bool> = trials.iter().map(is_needless).collect();
-        let mut needless = needless.into_iter();
-        trials.retain(|_| !needless.next().unwrap_or(false));
-    }
-
     /// Fits those trials to the sample that promise enough.
     fn scout_promising(&self, state: &State, screen: &Screen, trials: &mut [Trial], round: usize) {
         let mut best = 0.25 * self.scorer.settings.least_gain_of(1, 1) / SHARE_TO_SCOUT;
+        // Motions that have found nothing, by name and scans.
+        let mut at_rest = Vec::new();
         for trial in trials {
+            if at_rest.contains(&trial.key()) {
+                trial.candidate.gain = 0.0;
+                continue;
+            }
             let is_far_and_cheap = trial.has_far_start
                 && trial.candidate.numbers <= MOST_NUMBERS_FAR
                 && !trial.effect.moves();
@@ -174,6 +162,12 @@ impl<'p> Search<'p> {
                 (self.notify)(&format!("round {round}: trying {}", trial.effect.name()));
                 self.scout(state, screen, trial);
                 best = best.max(trial.candidate.gain);
+                // Of a motion the simplest members show something, and flexible ones take long.
+                let least =
+                    self.scorer.settings.least_gain_of(trial.candidate.numbers, trial.tried);
+                if trial.effect.moves() && trial.candidate.gain < SHARE_OF_LEAST * least {
+                    at_rest.push(trial.key());
+                }
             }
         }
     }
