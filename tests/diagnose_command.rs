@@ -663,7 +663,7 @@ fn two_clouds_of_one_target_have_one_answer() {
                 "--scene",
                 "second.toml",
             ][..],
-            "2 clouds have 3 scenes",
+            "3 scenes for 2 clouds",
         ),
         (&["out2/cloud.ply", "--scene", "scene.toml", "--scene", "other.toml"][..], "is of `ptfe`"),
         (&["out/cloud.ply", "--scene", "scene.toml"][..], "is given twice"),

@@ -312,7 +312,7 @@ fn parameters(cases: &[Case]) -> String {
     });
     format!(
         "Cases in which the right effect was named, alone or not, and parameters that mean the same in label and report. \
-         Errors of levels are in dB, others in per cent of the truth. A stated sd covers noise only; the truth can have \
+         Errors of levels are in dB, others in per cent of the truth. A stated sd covers noise, and what the model leaves from place to place; the truth can have \
          another form than the program's effect, which adds an error.\n\n{}",
         table(&head, rows)
     )

@@ -222,6 +222,10 @@ impl<'a> Publication<'a> {
         if !self.adoption.report.base.converged {
             notices.push("the final fit did not converge: take the numbers with care".to_owned());
         }
+        // Of contradictory clouds nothing is stored, and no scene is written.
+        if self.adoption.report.verdict == Verdict::Contradictory {
+            return notices;
+        }
         let unstored = self.unstored();
         if !unstored.is_empty() {
             notices.push(format!(

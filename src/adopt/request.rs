@@ -6,7 +6,7 @@ use super::earlier::check_folder;
 use super::recipients::{check_fit_name, find_recipient};
 use super::scene_after::{AFTER, after_of, check_beside};
 use crate::diagnose::{DiagnoseError, MeasuredScene, Report, declared_receiver, diagnose_together};
-use crate::effects::{Antenna, BeamSpot, Effect, SecondBounce, library};
+use crate::effects::{About, Antenna, BeamSpot, Effect, SecondBounce, Setting, library};
 use crate::error::Error;
 use crate::files::folder_of;
 use crate::measure::{Cloud, CloudError};
@@ -20,6 +20,9 @@ use crate::units::ratio_from_db;
 /// Warning for a scene according to which every chirp would measure its power exactly.
 const NO_SPECKLE: &str = "the scene declares no speckle, so that any scatter of the powers is an effect to be found; a \
                           measured cloud has some: state `looks` under [radar.speckle]";
+
+/// Most clouds of one diagnosis, all of which are in memory.
+const MOST_CLOUDS: usize = 1000;
 
 /// What to diagnose, and where the answer goes.
 #[derive(Clone, Copy)]
@@ -78,6 +81,7 @@ impl FurtherScene {
         let scene = Scene::load(path)?;
         check_predicted(&scene, path, None)?;
         let ready = ReadyScene::new(scene, path, store)?;
+        check_declared(&ready, path, None)?;
         Ok(FurtherScene { path: path.to_owned(), ready, text })
     }
 }
@@ -111,6 +115,7 @@ impl<'a> CloudRequest<'a> {
         let antenna = self.receiver.map(|name| self.antenna(&scene, name)).transpose()?;
         check_predicted(&scene, self.scene, antenna)?;
         let ready = ReadyScene::new(scene, self.scene, store)?;
+        check_declared(&ready, self.scene, antenna)?;
         let further = self.further.iter().map(|(_, path)| FurtherScene::load(path, store));
         let further = further.collect::<Result<Vec<_>, _>>()?;
         self.check_together(&ready, &further)?;
@@ -150,6 +155,12 @@ impl<'a> CloudRequest<'a> {
 
     /// Checks that several clouds differ and that their scenes have the same regions of the same materials.
     fn check_together(&self, first: &ReadyScene, further: &[FurtherScene]) -> Result<(), Error> {
+        if self.further.len() >= MOST_CLOUDS {
+            return Err(Error::usage(
+                format!("{} clouds are more than {MOST_CLOUDS}", self.further.len() + 1),
+                "diagnose them in groups",
+            ));
+        }
         for (number, cloud) in self.clouds().enumerate() {
             let real = cloud.canonicalize().ok();
             if real.is_some()
@@ -379,6 +390,26 @@ impl Rendered {
         let bounce = self.bounce.as_ref().map(|bounce| (bounce as &dyn Effect, Vec::new()));
         spot.into_iter().chain(bounce).collect()
     }
+}
+
+/// Refuses effects that the scene or its materials declare and that have no meaning for this cloud.
+fn check_declared(ready: &ReadyScene, path: &Path, antenna: Option<Antenna>) -> Result<(), Error> {
+    let scene = &ready.scene;
+    let has = |setting: Setting| match setting {
+        Setting::SeveralRays => scene.file.spot.rays > 1,
+        Setting::Bounce => scene.file.bounce.is_some(),
+        Setting::RangeReceiver => scene.radar().receiver.is_some(),
+        Setting::Sheets => scene.target.transmits(),
+        Setting::OtherAntenna => antenna.is_some(),
+    };
+    for (effect, _) in ready.model().iter().flat_map(|model| &model.effects) {
+        let About { name, conflicts, .. } = effect.about();
+        if let Some(conflict) = conflicts.iter().find(|conflict| has(conflict.with)) {
+            let problem = format!("{}: effect {name} {}", path.display(), conflict.problem);
+            return Err(Error::usage(problem, conflict.way_out));
+        }
+    }
+    Ok(())
 }
 
 /// Refuses what a scene declares and no diagnosis predicts: it would be found as an effect.

@@ -90,7 +90,7 @@ impl Alarms {
 
     /// ln likelihood under a receiver.
     pub(super) fn ln_p(&self, receiver: &Receiver, limits: ReceiverLimits) -> f64 {
-        if self.silent == 0 && self.powers_w.is_empty() {
+        if self.silent == 0 && self.powers_w.is_empty() && self.stronger_w.is_empty() {
             return 0.0;
         }
         let cell = self.cell(receiver, limits);

@@ -67,8 +67,8 @@ pub(super) fn choose_effects<'a>(
         let has_grown =
             add_best(search, &mut model, &mut trials) || add_pair(search, &mut model, &mut trials);
         if !has_grown {
-            hidden = hidden_by_the_strongest(search, &model, &mut trials);
             excluded = excluded_by_a_cloud(search, &model, &mut trials);
+            hidden = hidden_by_the_strongest(search, &model, &mut trials);
         }
         // Of each family the member that was accepted, or the best.
         let mut candidates: Vec<Candidate> =
@@ -117,7 +117,7 @@ pub(super) fn choose_effects<'a>(
     model.added.iter_mut().for_each(|one| one.class.retain(|name| !space.has(name, &[])));
     ranking.iter_mut().for_each(|one| one.accepted &= space.has(one.name, &one.scans));
     // Without an effect nothing is hidden, and what was exchanged for another is not.
-    hidden.retain(|one| !space.effects.is_empty() && !space.has(one.name, &[]));
+    hidden.retain(|one| !space.effects.is_empty() && !space.has(one.name, &one.scans));
     Ok(Choice { base, model, ranking, structure, hidden, excluded })
 }
 
@@ -141,7 +141,7 @@ fn hidden_by_the_strongest<'a>(
         if judge.support(trial).is_some()
             && trial.candidate.size_db >= scorer.settings.least_structure_db
             && judge.beats_placebos(trial)
-            && found.iter().all(|one| one.name != trial.candidate.name)
+            && !found.iter().any(|one| one.is_same(&trial.candidate))
         {
             found.push(trial.candidate.clone());
         }

@@ -36,7 +36,7 @@ pub(super) fn contradictions(scorer: &Scorer, choice: &Choice) -> Vec<Contradict
 
 /// The cloud that excludes an effect.
 fn of_effect(candidate: &Candidate) -> Option<Contradiction> {
-    let worst = candidate.by_cloud.iter().min_by(|a, b| a.gain.total_cmp(&b.gain))?;
+    let worst = candidate.acting().min_by(|a, b| a.gain.total_cmp(&b.gain))?;
     let CloudGain { cloud, gain, se } = *worst;
     let (effect, size_db) = (Some(candidate.name), candidate.size_db);
     worst.contradicts().then_some(Contradiction { cloud, effect, gain, se, size_db })
@@ -60,7 +60,7 @@ fn laws_apart(scorer: &Scorer, state: &State, largest_db: f64) -> Vec<Contradict
         };
         let alone = Scorer { problem, folds: &folds, settings: scorer.settings };
         let fit = problem.fit(&state.space, &state.fit.at, &held, &SEARCH);
-        let own = alone.held_out(&state.space, &fit.at);
+        let own = alone.held_out_but(&state.space, &fit.at, &held);
         let joint = &state.held_out.shots[range];
         let gains: Vec<f64> = own.shots.iter().zip(joint).map(|(a, b)| a.ln_p - b.ln_p).collect();
         let [gain, se] = folds.sum(&gains);

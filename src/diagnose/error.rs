@@ -161,7 +161,7 @@ pub enum DiagnoseError {
     /// Effects that move the target, and a scene without a range error.
     #[error(
         "the scene states no error of ranges, and {effects} cannot be identified from powers alone; give \
-         `range_sd_m` under [radar.noise]"
+         `range_sd_m` under [radar.noise], which takes the place of [radar.receiver]"
     )]
     Unranged {
         /// Their names.

@@ -86,9 +86,18 @@ impl Candidate {
         self.name == other.name && self.scans == other.scans
     }
 
-    /// Whether one of several clouds excludes it.
+    /// Whether one of several clouds on which it acts excludes it.
     pub(super) fn is_excluded(&self) -> bool {
-        self.by_cloud.iter().any(CloudGain::contradicts)
+        self.acting().any(CloudGain::contradicts)
+    }
+
+    /// Its gains in the clouds on which it acts.
+    pub(super) fn acting(&self) -> impl Iterator<Item = &CloudGain> {
+        let acts = |one: &&CloudGain| {
+            self.scans.is_empty()
+                || self.scans.iter().any(|scan| usize::from(*scan) + 1 == one.cloud)
+        };
+        self.by_cloud.iter().filter(acts)
     }
 }
 

@@ -56,6 +56,9 @@ fn contest<'a>(
     let with_rival = scorer.settle(without, space, fit, held_out);
     candidate.held_out = Some(scorer.difference(&with_rival.held_out, &without.held_out));
     candidate.by_cloud = clouds::gains(scorer, &with_rival.held_out, &without.held_out);
+    if candidate.is_excluded() {
+        return;
+    }
     // Of effects that predict equally well the one with fewer parameters in use and nearer laws is better.
     let [better, se] = scorer.difference(&with_rival.held_out, &state.held_out);
     let is_tied = better.abs() <= se.max(SAME);

@@ -246,8 +246,8 @@ impl Scan<'_> {
         MOST_OVER_THRESHOLD * self.threshold_w
     }
 
-    /// Whether a detection away from the target may be of noise: on its chirp's ray, at most 6 dB above the threshold, and the only one
-    /// that its chirp reports. `spoke`: the chirps that have reported one.
+    /// Whether a detection away from the target may be of noise: on its chirp's ray, at most 6 dB above the threshold, and the
+    /// first such of its chirp unless all detections are reported. `spoke`: the chirps that have one.
     fn is_alarm(&self, point: &CloudPoint, shot: &Shot, spoke: &mut HashSet<u32>) -> bool {
         off_ray_m(point, &shot.ray).length() <= ON_RAY_M
             && point.power_w <= self.most_alarm_w()

@@ -5,8 +5,8 @@
 //! of place and angle do not show.
 //!
 //! Chirps that share speckle have a spectrum with lines at the turns of the mirror. It is the transform of what pairs of
-//! shots share by the distance of their chirp numbers, at a level that the lines tell, over a flat one for the rest. The
-//! levels are the likeliest (Whittle), and each line counts over the level of its place. Speckle of which chirps have no part
+//! shots share by the distance of their chirp numbers, at one level, over a flat level for the rest. Both levels are the
+//! likeliest (Whittle), and each line counts over the level of its place. Speckle of which chirps have no part
 //! to themselves, on an even grid, has levels between its lines that this does not follow.
 
 use std::f64::consts::LN_2;

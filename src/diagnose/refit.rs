@@ -52,10 +52,7 @@ impl Problem<'_> {
         held: &[usize],
         search: &Minimise,
     ) -> Fit {
-        let [mut lower, mut upper] = space.bounds();
-        for &index in held {
-            (lower[index], upper[index]) = (start[index], start[index]);
-        }
+        let [lower, upper] = bounds(space, start, held);
         let bounds = [&lower, &upper];
         if !space.moving().into_iter().any(|index| lower[index] < upper[index]) {
             return self.fit_by(EFFECT_STEP, space, start, bounds, search);
@@ -135,15 +132,16 @@ impl Problem<'_> {
 
     /// The most likely points of fits without each fold in turn, by a full step from the most likely
     /// point of all shots. The folds' points differ from it by about its standard deviation, over which
-    /// ln likelihood is a parabola. The points come one after the other, so that rays traced for one are still
-    /// there when it is used.
+    /// ln likelihood is a parabola. The unknowns numbered in `held` stay. The points come one after the other, so that rays
+    /// traced for one are still there when it is used.
     pub fn fit_without(
         &self,
         space: &Space,
         at: &DVector<f64>,
+        held: &[usize],
         folds: &Folds,
     ) -> impl Iterator<Item = DVector<f64>> {
-        let [lower, upper] = space.bounds();
+        let [lower, upper] = bounds(space, at, held);
         let terms = self.terms(space, at);
         let slopes = self.slopes(space, at, [&lower, &upper], &terms);
         (0..folds.folds).map(move |fold| {
@@ -245,6 +243,14 @@ fn products_of_cells(slopes: &[Vec<Slope>], folds: &Folds) -> DMatrix<f64> {
     let cells = of_cells.first().map_or(2, |sums| sums.len().max(2)) as f64;
     let products = |i: usize, j: usize| of_cells[i].dot(&of_cells[j]);
     DMatrix::from_fn(slopes.len(), slopes.len(), products) * (cells / (cells - 1.0))
+}
+
+/// Least and largest value of every unknown; those numbered in `held` stay where they are.
+fn bounds(space: &Space, at: &DVector<f64>, held: &[usize]) -> [DVector<f64>; 2] {
+    space.bounds().map(|mut ends| {
+        held.iter().for_each(|&index| ends[index] = at[index]);
+        ends
+    })
 }
 
 /// ln likelihood of the shots outside a fold.

@@ -151,7 +151,7 @@ fn report(
         error: answer::before_after(scorer, errors, with_unknown),
         set_aside: subject.strays.iter().map(Vec::len).sum(),
         beside_edge: strays.beside_edge,
-        false_alarms: false_alarms(subject),
+        false_alarms: false_alarms(subject, base),
         independent_chirps: scorer.problem.independent_shots(),
         controls,
         clouds: answer::clouds(scorer, base, &model.state, &sd),
@@ -190,10 +190,10 @@ fn refuse_another_target(scorer: &Scorer, base: &State) -> Result<(), DiagnoseEr
     Ok(())
 }
 
-/// The false alarms of all clouds.
-fn false_alarms(subject: &Subject) -> FalseAlarms {
-    let each = subject.alarms.iter();
-    let each = each.map(|alarms| alarms.counted(&subject.receiver, subject.declared));
+/// The false alarms of all clouds, under what the scene declares.
+fn false_alarms(subject: &Subject, base: &State) -> FalseAlarms {
+    let receiver = base.space.received(subject.receiver, &base.fit.at);
+    let each = subject.alarms.iter().map(|alarms| alarms.counted(&receiver, subject.declared));
     each.reduce(FalseAlarms::and).unwrap_or_default()
 }
 

@@ -139,13 +139,29 @@ impl Scorer<'_> {
 
     /// Score of every shot by a fit without its fold.
     pub fn held_out(&self, space: &Space, at: &DVector<f64>) -> HeldOut {
-        self.held_out_with(space, at, &[])
+        self.held_out_of(space, at, &[], &[])
+    }
+
+    /// The same where the unknowns numbered in `held` stay.
+    pub fn held_out_but(&self, space: &Space, at: &DVector<f64>, held: &[usize]) -> HeldOut {
+        self.held_out_of(space, at, held, &[])
     }
 
     /// Held-out scores with factors on the means, given by their logarithms.
     pub fn held_out_with(&self, space: &Space, at: &DVector<f64>, ln_factor: &[f64]) -> HeldOut {
+        self.held_out_of(space, at, &[], ln_factor)
+    }
+
+    fn held_out_of(
+        &self,
+        space: &Space,
+        at: &DVector<f64>,
+        held: &[usize],
+        ln_factor: &[f64],
+    ) -> HeldOut {
         let mut all: Vec<(usize, Score)> = Vec::new();
-        for (fold, at) in self.problem.fit_without(space, at, self.folds).enumerate() {
+        let fits = self.problem.fit_without(space, at, held, self.folds);
+        for (fold, at) in fits.enumerate() {
             let prediction = scaled(self.problem.predict(space, &at), ln_factor);
             let is_held_out = |shot| self.folds.holds_out(fold, shot);
             all.extend(scores(&self.problem, &prediction, is_held_out));

@@ -273,7 +273,7 @@ fn names_and_parameters_are_unique() {
     }
 }
 
-/// Beside them a second motion is of the square of the step.
+/// To first order in a step, twists are what the motion does.
 #[test]
 fn twists_are_the_slopes_of_the_motion() {
     const STEP: f64 = 1e-3;

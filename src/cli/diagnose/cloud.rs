@@ -14,7 +14,7 @@ use crate::cli::effects::chosen;
 use crate::diagnose::{DiagnoseError, Report};
 use crate::error::Error;
 use crate::files::{FilesError, Placement, WayOut, write_all};
-use crate::formats::words::listed;
+use crate::formats::words::{counted, listed};
 use crate::report::{CannotTell, shell_word};
 use crate::setup::{Database, USUAL_DATABASE};
 
@@ -62,7 +62,7 @@ fn scene_of_each(args: &Args) -> Result<Vec<&Path>, Error> {
         [one] => Ok(vec![one; clouds]),
         _ if scenes.len() == clouds => Ok(scenes),
         _ => Err(Error::usage(
-            format!("{clouds} clouds have {} scenes", scenes.len()),
+            format!("{} for {}", counted(scenes.len(), "scene"), counted(clouds, "cloud")),
             "give --scene once for each cloud, in the same order, or once for all",
         )),
     }
