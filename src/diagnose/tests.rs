@@ -331,7 +331,7 @@ fn a_weak_effect_beside_a_strong_one_gets_no_name() {
     let report = diagnosed(&[(&BOWL, -7.5), (&DRIFT, 1.5)], 7);
     let names: Vec<&str> = report.effects.iter().map(|e| e.name).collect();
     assert_eq!((names, report.verdict), (vec!["bowl"], Verdict::Unexplained), "{report:#?}");
-    let hidden = report.unexplained.iter().find(|one| one.covariate == "may be drift").unwrap();
+    let hidden = report.unexplained.iter().find(|one| one.covariate == "may be trend").unwrap();
     // A slope of 1.5 dB over the scan has 0.43 dB.
     assert!((hidden.strength_db - 0.43).abs() < 0.15 && hidden.p_value < 1e-3, "{hidden:?}");
     // Alone it has a name.

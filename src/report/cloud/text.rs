@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::places::{self, Peak};
 use crate::diagnose::{CloudPart, Errors, FalseAlarms, FoundEffect, Report};
-use crate::formats::words::{listed, plus_minus, uncapitalised};
+use crate::formats::words::{counted, listed, plus_minus, uncapitalised};
 use crate::report::words::{covariate, gone, named, numbers, others, sentence, summary, verdict};
 
 /// Lines of what remains that are shown; the page has all.
@@ -65,14 +65,12 @@ fn beside_edge(count: usize) -> String {
 
 /// How many detections count as false alarms; nothing where none does and the noise predicts less than one.
 fn false_alarms(alarms: &FalseAlarms) -> String {
-    let FalseAlarms { counted, expected } = *alarms;
-    match expected {
-        Some(expected) if counted > 0 || expected >= 1.0 => {
-            format!(
-                "false alarms: {counted} detections; the declared noise predicts {expected:.1}\n"
-            )
+    let detections = counted(alarms.counted, "detection");
+    match alarms.expected {
+        Some(expected) if alarms.counted > 0 || expected >= 1.0 => {
+            format!("false alarms: {detections}; the declared noise predicts {expected:.1}\n")
         }
-        None if counted > 0 => format!("false alarms: {counted} detections\n"),
+        None if alarms.counted > 0 => format!("false alarms: {detections}\n"),
         _ => String::new(),
     }
 }
