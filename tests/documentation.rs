@@ -122,7 +122,7 @@ fn run_shell(folder: &Path, script: &str) -> assert_cmd::assert::Assert {
 /// A folder with what the documentation uses of a clone.
 fn clone() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    for part in ["scenes", "examples/lab"] {
+    for part in ["scenes", "examples/lab", "tests/fixtures/mitsuba"] {
         copy(&root().join(part), &folder.path().join(part));
     }
     folder
