@@ -1,7 +1,9 @@
 //! What a command says, and to whom: results to standard output, the rest to standard error.
 
-use std::io::{self, BufWriter, ErrorKind, Write};
+use std::io::{self, BufWriter, ErrorKind, IsTerminal, Write};
 use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
@@ -44,14 +46,16 @@ impl Console {
         }
     }
 
-    /// A sign of life for work without known steps; invisible like [`progress`](Self::progress).
-    pub fn spinner(&self, what: &'static str) -> ProgressBar {
+    /// A sign of life for work without known steps.
+    pub fn activity(&self, what: &'static str) -> Activity {
         let bar = self.progress(what, 0);
         let style = ProgressStyle::with_template("{spinner} {elapsed} {msg}")
             .unwrap_or_else(|_| ProgressStyle::default_spinner());
         bar.set_style(style);
-        bar.enable_steady_tick(std::time::Duration::from_millis(100));
-        bar
+        bar.enable_steady_tick(Duration::from_millis(100));
+        let has_lines = !self.quiet && !io::stderr().is_terminal();
+        let last = has_lines.then(|| Mutex::new(Instant::now()));
+        Activity { what, bar, last }
     }
 
     /// A progress bar over `total` steps; invisible when standard error is no terminal.
@@ -63,6 +67,35 @@ impl Console {
         ProgressBar::with_draw_target(Some(total as u64), target)
             .with_style(style)
             .with_message(what)
+    }
+}
+
+/// Work that says what it does: on a terminal in a line that changes, elsewhere in a line at most every ten seconds.
+pub(super) struct Activity {
+    what: &'static str,
+    bar: ProgressBar,
+    /// When the last line was written; none on a terminal.
+    last: Option<Mutex<Instant>>,
+}
+
+impl Activity {
+    /// Says what it does now.
+    pub fn now(&self, step: &str) {
+        const BETWEEN: Duration = Duration::from_secs(10);
+        let text = format!("{}: {}", self.what, readable(step));
+        if let Some(last) = &self.last {
+            let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
+            if last.elapsed() >= BETWEEN {
+                eprintln!("{text}");
+                *last = Instant::now();
+            }
+        }
+        self.bar.set_message(text);
+    }
+
+    /// Takes the line off a terminal.
+    pub fn end(self) {
+        self.bar.finish_and_clear();
     }
 }
 

@@ -100,9 +100,9 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         registration: registration(args)?,
         region: args.region.as_deref(),
     };
-    let bar = console.spinner("registering");
+    let activity = console.activity("registering");
     let measured = request.run()?;
-    bar.finish_and_clear();
+    activity.end();
     // Refused before anything is written, stored after it.
     if let Some(storage) = &storage {
         let doubts = storage.admit(&measured, db.read()?.as_ref())?;

@@ -85,9 +85,9 @@ fn diagnose(
     for notice in clouds.iter().flat_map(|cloud| &cloud.notices).chain(notices) {
         console.notice(notice);
     }
-    let bar = console.spinner("diagnosing");
-    let report = checked.diagnose(&clouds, &|what| bar.set_message(format!("diagnosing: {what}")));
-    bar.finish_and_clear();
+    let activity = console.activity("diagnosing");
+    let report = checked.diagnose(&clouds, &|step| activity.now(step));
+    activity.end();
     Ok(report?)
 }
 
