@@ -60,6 +60,8 @@ fn every_command_of_the_readme_runs() {
             assert_printed(&output.stdout, &lines);
         }
     }
+    // The tutorial's own test runs what starts from the scan of another program.
+    outputs.retain(|command, _| !command.contains("tests/fixtures"));
     assert!(
         outputs.is_empty(),
         "{MODEL_THAT_MISSES} shows what the README does not run: {outputs:?}"
