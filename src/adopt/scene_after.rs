@@ -24,7 +24,7 @@ pub const MARK: &str = "# Written by `matdb diagnose --add`, which may write it 
 
 /// The scene file with the effects of the scene and of the radar that were found, and the radar at the level that was
 /// found, dB over its settings; `materials` are the names that its regions get. It has no `[[receiver]]` where an effect is
-/// [of the radar's own echoes](of_own_echoes) alone.
+/// of the radar's own echoes alone.
 pub fn scene_with_found(
     scene: &Scene,
     found: &[FoundEffect],

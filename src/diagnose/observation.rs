@@ -13,7 +13,7 @@ pub struct Observation {
     /// Range, m; `None` where nothing was detected or the cloud has no range.
     pub range_m: Option<f64>,
     /// Power that an echo without a detection stayed below, W: that of a false alarm which was reported instead, or
-    /// [`NO_LIMIT_W`]; `None` for the threshold.
+    /// 1 MW where a nearer detection ended the chirp; `None` for the threshold.
     pub limit_w: Option<f64>,
 }
 
