@@ -238,25 +238,19 @@ impl<'a> CloudRequest<'a> {
             if self.effects.is_empty() { library().to_vec() } else { self.effects.to_vec() };
         let choice = Choice::new(&asked, &declared, measured);
         if !self.effects.is_empty() {
-            let untimed = choice.left_out(Reason::NoTimes).join(" and ");
-            if !untimed.is_empty() {
-                return Err(DiagnoseError::Untimed { effects: untimed }.into());
-            }
-            let unranged = choice.left_out(Reason::NoRanges).join(" and ");
-            if !unranged.is_empty() {
-                return Err(DiagnoseError::Unranged { effects: unranged }.into());
-            }
-            let elsewhere = choice.left_out(Reason::OtherAntenna).join(" and ");
-            if !elsewhere.is_empty() {
-                return Err(DiagnoseError::OtherAntenna { effects: elsewhere }.into());
-            }
-            let by_receiver = choice.left_out(Reason::RangeReceiver).join(" and ");
-            if !by_receiver.is_empty() {
-                return Err(DiagnoseError::RangeReceiver { effects: by_receiver }.into());
-            }
-            let moving = choice.left_out(Reason::Bounce).join(" and ");
-            if !moving.is_empty() {
-                return Err(DiagnoseError::Bounce { effects: moving }.into());
+            type Refusal = (Reason, fn(String) -> DiagnoseError);
+            let refusals: [Refusal; 5] = [
+                (Reason::NoTimes, |effects| DiagnoseError::Untimed { effects }),
+                (Reason::NoRanges, |effects| DiagnoseError::Unranged { effects }),
+                (Reason::OtherAntenna, |effects| DiagnoseError::OtherAntenna { effects }),
+                (Reason::RangeReceiver, |effects| DiagnoseError::RangeReceiver { effects }),
+                (Reason::Bounce, |effects| DiagnoseError::Bounce { effects }),
+            ];
+            for (reason, refusal) in refusals {
+                let names = choice.left_out(reason);
+                if !names.is_empty() {
+                    return Err(refusal(names.join(" and ")).into());
+                }
             }
         }
         if choice.tried.is_empty() {

@@ -114,7 +114,7 @@ impl Effect for InScans<'_> {
 
     fn twists(&self, values: &[f64], stage: &Stage, shot: &Shot) -> Vec<Twist> {
         let mut twists = self.effect.twists(values, stage, shot);
-        if !self.scans.is_empty() && !self.scans.contains(&shot.scan) {
+        if !self.acts_on(shot.scan) {
             twists.fill(Twist::default());
         }
         twists

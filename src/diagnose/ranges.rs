@@ -90,8 +90,7 @@ fn rows(problem: &Problem, space: &Space, effect: &dyn Effect, at: &DVector<f64>
     pairs
         .filter_map(|(shot, seen): (&Shot, &Observation)| {
             let range_m = seen.range_m.filter(|_| problem.declared.range_sd_m > 0.0)?;
-            let acts = effect.scans().is_empty() || effect.scans().contains(&shot.scan);
-            let model = models.get(usize::from(shot.scan)).filter(|_| acts)?;
+            let model = models.get(usize::from(shot.scan)).filter(|_| effect.acts_on(shot.scan))?;
             let stage = problem.stage(shot);
             let placed = model.placed(stage, *shot)?;
             let twists = effect.twists(&values, stage, &placed);

@@ -288,7 +288,7 @@ impl<'a> Space<'a> {
         }
         let found = self.effects.iter().copied().zip(self.effect_values(at));
         let all = self.declared.iter().cloned().chain(found);
-        let all = all.filter(|(effect, _)| acts_on(*effect, scan));
+        let all = all.filter(|(effect, _)| effect.acts_on(scan));
         let all = all.map(|(effect, values)| match effect.whole(&values) {
             Some((whole, all)) => (whole as &dyn Effect, all),
             None => (effect, values),
@@ -305,7 +305,7 @@ impl<'a> Space<'a> {
         let declared = self.declared.iter().cloned();
         declared
             .chain(found)
-            .filter(|(effect, _)| acts_on(*effect, 0))
+            .filter(|(effect, _)| effect.acts_on(0))
             .fold(receiver, |receiver, (effect, values)| effect.receive(&values, receiver))
     }
 
@@ -326,11 +326,6 @@ impl<'a> Space<'a> {
         }
         [DVector::from_vec(lower), DVector::from_vec(upper)]
     }
-}
-
-/// Whether an effect acts on a scan.
-fn acts_on(effect: &dyn Effect, scan: u16) -> bool {
-    effect.scans().is_empty() || effect.scans().contains(&scan)
 }
 
 /// A point with one unknown moved within bounds.

@@ -74,6 +74,11 @@ pub trait Effect: Sync {
         &[]
     }
 
+    /// Whether it acts on a scan.
+    fn acts_on(&self, scan: u16) -> bool {
+        self.scans().is_empty() || self.scans().contains(&scan)
+    }
+
     /// Whether it depends on the time of a chirp.
     fn depends_on_time(&self) -> bool {
         false
