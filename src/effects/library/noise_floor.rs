@@ -33,7 +33,8 @@ impl Effect for NoiseFloor {
 
     fn starts(&self, stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
         let [least, most] = [NONE_DBM + 1.0, -30.0];
-        let below_db = [13.0, 8.0, 4.0];
+        // The lowest of them is what half a dB more noise is where false alarms are rare.
+        let below_db = [16.0, 12.0, 8.0, 4.0];
         below_db.map(|b| vec![(stage.geometry.radar.threshold_dbm - b).clamp(least, most)]).to_vec()
     }
 
