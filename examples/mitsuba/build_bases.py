@@ -99,25 +99,31 @@ def load(name):
     return scene, {f"s{i}": i for i in range(len(record) - 1)}
 
 
+def met(name, pattern="once"):
+    """What each chirp of a scan meets, as a base holds it."""
+    aim, _ = scan.aims(pattern)
+    chirps = trace(*load(name), scan.ORIGIN, scan.directions(aim), True)
+    return dict(
+        range_m=chirps["range"], normal=chirps["normal"].astype("f4"), piece=chirps["piece"].astype("i1"),
+        facet=chirps["facet"].astype("i4"), f_cos=chirps["fcos"].astype("f4"))
+
+
 def build(name):
     material = targets.MATERIALS[name]
     scene, order = load(name)
-    aim, _ = scan.aims()
-    chirps = trace(scene, order, scan.ORIGIN, scan.directions(aim), True)
+    chirps = met(name)
     x, y = scan.grid()
     raster = np.stack(np.meshgrid(x, y), -1).reshape(-1, 2)
     field = trace(scene, order, scan.ORIGIN, scan.directions(raster), False)
     total, lobe = mi.load_dict(bsdf(material, "all")), mi.load_dict(bsdf(material, "specular"))
     table = np.array([[backscatter(total, a), backscatter(lobe, a)] for a in ANGLES])
     np.savez_compressed(
-        f"bases/{name}.npz",
-        range_m=chirps["range"], normal=chirps["normal"].astype("f4"), piece=chirps["piece"].astype("i1"),
-        facet=chirps["facet"].astype("i4"), f_cos=chirps["fcos"].astype("f4"),
+        f"bases/{name}.npz", **chirps,
         angle_rad=ANGLES, f_all=table[:, 0], f_lobe=table[:, 1],
         grid_range_m=field["range"].astype("f4"), grid_piece=field["piece"].astype("i1"),
         grid_normal=np.round(field["normal"] * 32000).astype("i2"),
     )
-    hit = chirps["range"] > 0
+    hit = chirps["range_m"] > 0
     print(f"{name}: {hit.mean():.2f} of the chirps hit; {os.path.getsize(f'bases/{name}.npz') / 1e3:.0f} kB")
 
 

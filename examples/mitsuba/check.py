@@ -158,6 +158,44 @@ def moves():
         say(f"{name}: moved, incidence, 95 % within, mrad", 1e3 * np.quantile(np.abs(t - state.clean_theta())[both], 0.95), 3)
 
 
+def scans():
+    """Places that are met twice, and the speckle of the second visit."""
+    for pattern, visits in (("ellipses-twice", (20, 2, 115)), ("scan-twice", (1, 2, 2300))):
+        aim = scan.aims(pattern)[0].reshape(visits + (2,))
+        say(f"{pattern}: first against second visit of each place, m", np.abs(aim[:, 0] - aim[:, 1]).max(), 1e-12)
+        rng, w0 = np.random.default_rng(3), physics.waist_m(13.6)
+        places = aim.reshape(-1, 2)
+        f = physics.speckle(rng, 4, w0, places, np.zeros(len(places), int), True).reshape((4,) + visits)
+        say(f"{pattern}: their speckle", np.abs(f[:, :, 0] - f[:, :, 1]).max(), 1e-9)
+    aim, _ = scan.aims("long")
+    apart = np.hypot(*np.diff(aim, axis=0).T)
+    say("long: chirps a turn and their distance against the paper's 6 mm, median off, mm", abs(1e3 * np.median(apart) - 6), 0.5)
+
+
+def numbers():
+    """True numbers of a gain that has a stated form, and of a pose, against what they were made of."""
+    base = dict(np.load("bases/groove.npz"))
+    s = State(base, "groove", physics.waist_m(13.6))
+    forms = effects.stated_forms(s)
+    for name, index, true in (("drift", 1, (3.0, -1.0, 0.5)), ("fov-gain", 2, (-4.0, 1.0, -2.0, 0.7, 0.3, 5.0))):
+        gain = sum(a * column for a, column in zip(true, forms[name][index].values()))
+        fitted = effects.numbers_of_gains(s, {name: gain}, s.range_m > 0)[name][index]
+        say(f"{name}: numbers of a gain of that form, worst dB", np.abs(np.array(list(fitted.values())) - true).max(), 1e-6)
+    v = np.random.default_rng(1).normal(size=6) * np.array([4e-3, 4e-3, 4e-3, 0.01, 0.015, 0.01])
+    told = effects.pose_numbers(s, v[:3], v[3:])
+    point = (scan.ORIGIN + s.range_m[:, None] * s.ray)[s.range_m > 0]
+    middle = point.mean(0)
+    matrix = targets.rotation([told[f"rotation_{a}_deg"] for a in "xyz"])
+    moved = (point - middle) @ matrix.T + middle + [told[f"translation_{a}_m"] for a in "xyz"]
+    angle = np.linalg.norm(v[3:])
+    k = np.cross(np.eye(3), v[3:] / angle)
+    turn = np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
+    say("pose: its numbers move the target as the effect does, worst m",
+        np.abs(moved - ((point - targets.CENTRE) @ turn.T + targets.CENTRE + v[:3])).max(), 1e-9)
+    # without the foot, and round, FWHM = sd sqrt(16 ln 2) of the two-way spot; the foot adds its power below the core
+    say("finite-spot: diameter of 4.8 mm two-way sd against 16 mm, mm off", abs(1e3 * effects.diameter_m(0.48, 1.0) - 16), 0.5)
+
+
 def met(name, ray):
     """Range and incidence on the sphere, the cylinder's endless side or the groove's first flat, from equations."""
     if name == "groove":
@@ -227,5 +265,7 @@ if __name__ == "__main__":
     noise()
     silhouettes()
     moves()
+    scans()
+    numbers()
     spots()
     sys.exit(1 if FAILED else 0)

@@ -2,12 +2,16 @@
 
 `apply(state, size, rng)` changes the state. Draws come from rng in the same order whatever the size."""
 
+import functools
+
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
 from scipy.special import polygamma
 
 import physics
 import scan
+import targets
 
 RMS_DB = {"weak": 0.35, "moderate": 0.7, "strong": 1.4}
 # Effects that change a scatter or a count: a strength of their own.
@@ -17,6 +21,7 @@ UNKNOWN = ("spiral", "stripes", "sawtooth", "checkers")
 
 
 def angle_error(s, size, rng):
+    s.numbers["angle-error"] = [{"sd_deg": size}]
     tail = rng.standard_t(5, size=(s.n, 2)) / np.sqrt(5 / 3)
     s.tilt = np.radians(size) * tail
 
@@ -31,6 +36,7 @@ def anisotropy(s, size, rng):
     across = np.cross(s.normal, along)
     a, b = np.sum(s.ray * along, 1), np.sum(s.ray * across, 1)
     r = np.exp(0.5 * size * 0.2)
+    s.numbers["anisotropy"] = [{"ratio": float(r**2)}]
     s.slope_scale = np.sqrt(((a / r) ** 2 + (b * r) ** 2) / (a**2 + b**2 + 1e-15))
 
 
@@ -51,6 +57,7 @@ def covering_layer(s, size, rng):
         x = a[0] + (s.surface[:, 1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
         inside ^= cross & (s.surface[:, 0] < x)
     thick = 1 + 0.15 * np.sin(s.surface @ rng.normal(0, 12, 2) + rng.uniform(0, 6))
+    s.numbers["covering-layer"] = [{"loss_db": float(size * np.mean(thick, where=inside & (s.range_m > 0)))}]
     s.gain = s.gain * physics.mw(-size * inside * thick / np.cos(s.theta()))
 
 
@@ -58,6 +65,7 @@ def drift(s, size, rng):
     """A warm-up that levels off, and two bends."""
     tau, knots = rng.uniform(0.1, 0.5), rng.normal(size=5)
     path = rng.choice([-1, 1]) * np.exp(-s.share / tau) * 2 + CubicSpline(np.linspace(0, 1, 5), knots)(s.share) * 0.6
+    s.gain_db["drift"] = size * path
     s.gain = s.gain * physics.mw(size * path)
 
 
@@ -75,6 +83,14 @@ def footprint(count, size, longer, turn):
     return 0.01 * size * np.stack([c * x - s * y, s * x + c * y], -1), weight / weight.sum()
 
 
+def diameter_m(size, longer):
+    """Of the circle as large as the contour of half the one-way intensity, which is a quarter of the two-way one."""
+    x, step = np.linspace(-4, 4, 801, retstep=True)
+    u2, v2 = np.meshgrid(x**2, x**2)
+    level = 0.93 / longer * np.exp(-(u2 / longer**2 + v2) / 2) + 0.07 / 6.25 * np.exp(-(u2 + v2) / 12.5)
+    return float(0.01 * size * 2 * np.sqrt(np.count_nonzero(level >= level.max() / 4) * step**2 / np.pi))
+
+
 TRACED = {}  # what finite_spot has traced for all chirps
 
 
@@ -83,13 +99,14 @@ def finite_spot(s, size, rng, count=96):
 
     `count` sub-rays for each chirp; 4 and then 16 times as many where four parts of them differ: at edges."""
     longer, turn = rng.uniform(1.0, 1.4), rng.uniform(0, np.pi)
-    key = (s.name, s.w0, size, longer, turn, count)
+    key = (s.name, s.pattern, s.w0, size, longer, turn, count)
     if s.draft:
         traced = spread(s, size, longer, turn, np.arange(0, s.n, 3), (count,))
     else:
         if key not in TRACED:
             TRACED[key] = spread(s, size, longer, turn, np.arange(s.n), (count, 4 * count, 16 * count))
         traced = TRACED[key]
+        s.numbers["finite-spot"] = [{"diameter_m": diameter_m(size, longer)}]
     s.spread, s.spread_share, s.range_m, s.piece, s.normal = (a.copy() for a in traced)
 
 
@@ -122,15 +139,17 @@ def foreign_patch(s, size, rng):
     phi, bumps = np.arctan2(d[:, 1], d[:, 0]), rng.uniform(0, 6, 2)
     outline = radius * (1 + 0.25 * np.cos(2 * phi + bumps[0]) + 0.15 * np.cos(3 * phi + bumps[1]))
     inside = (np.hypot(*d.T) < outline) & (s.piece == s.piece[np.argmin(np.hypot(*d.T))])
+    s.numbers["foreign-patch"] = [{"centre_x_m": float(centre[0]), "centre_y_m": float(centre[1])}]
     sign = rng.choice([-1, 1])
-    s.slope_scale = np.where(inside, 0.8 ** min(size / 3, 1.0), 1.0)  # its lobe is wider
+    s.slope_scale = s.slope_scale * np.where(inside, 0.8 ** min(size / 3, 1.0), 1.0)  # its lobe is wider
     s.gain = s.gain * physics.mw(size * sign * inside)
 
 
 def fov_gain(s, size, rng):
     x0, y0, power = rng.uniform(-0.06, 0.06), rng.uniform(-0.1, 0.1), rng.uniform(1.5, 2.8)
     r = np.hypot((s.aim[:, 0] - x0) / 0.25, (s.aim[:, 1] - y0) / 0.45)
-    s.gain = s.gain * physics.mw(size * rng.choice([-1, 1, -1]) * (r**power + 0.2 * s.aim[:, 0] / 0.25))
+    s.gain_db["fov-gain"] = size * rng.choice([-1, 1, -1]) * (r**power + 0.2 * s.aim[:, 0] / 0.25)
+    s.gain = s.gain * physics.mw(s.gain_db["fov-gain"])
 
 
 def motion(s, size, rng):
@@ -143,7 +162,18 @@ def motion(s, size, rng):
 
 def pose(s, size, rng):
     v = rng.normal(size=6) * np.array([4e-3, 4e-3, 4e-3, 0.01, 0.015, 0.01])
+    s.numbers["pose"] = [pose_numbers(s, size * v[:3], size * v[3:])]
     s.move(np.tile(size * v[:3], (s.n, 1)), np.tile(size * v[3:], (s.n, 1)))
+
+
+def pose_numbers(s, shift, turn):
+    """Angles about the fixed axes x, y, z, and the shift of the middle of what the scan would hit at rest."""
+    turned, hit = Rotation.from_rotvec(turn), s.range_m > 0
+    middle = (scan.ORIGIN + s.range_m[hit, None] * s.ray[hit]).mean(0) - targets.CENTRE
+    shift = shift + turned.apply(middle) - middle
+    angles = turned.as_euler("xyz", degrees=True)
+    numbers = {f"translation_{a}_m": float(t) for a, t in zip("xyz", shift)}
+    return numbers | {f"rotation_{a}_deg": float(r) for a, r in zip("xyz", angles)}
 
 
 def multi_bounce(s, size, rng):
@@ -185,12 +215,16 @@ def noise_floor(s, size, rng):
 
 
 def few_looks(s, size, rng):
+    s.numbers["speckle"] = [{"looks": size}]
     s.looks = size
 
 
 def subsurface(s, size, rng):
     """Volume return, a little stronger at normal incidence than at grazing."""
     theta = s.theta()
+    # of one level its mean, where a level of sigma-0 is one of power; of a power of the cosine that at normal incidence
+    flat = np.mean(0.8 + 0.3 * np.cos(theta), where=s.range_m > 0) if s.material["footprint"] == "paper" else None
+    s.numbers["subsurface"] = [{"sigma_v": flat and float(1e-3 * size * flat)}, {"sigma_v": 1.1e-3 * size, "cosine_power": None}]
     s.added_mw = s.added_mw + s.scale_mw(np.where(s.range_m > 0, s.range_m, 8)) * 1e-3 * size * (0.8 + 0.3 * np.cos(theta)) / (4 * np.pi)
 
 
@@ -198,6 +232,7 @@ def thin_film(s, size, rng):
     """A coating of slightly uneven thickness; what comes from below crosses it twice. Airy's formula over the band."""
     thickness, index, uneven = rng.uniform(1.2e-3, 2.8e-3), rng.uniform(1.7, 2.2), rng.normal(0, 0.3, 2)
     d = thickness * (1 + 0.02 * np.sin(s.surface @ (uneven * 20)))
+    s.numbers["thin-film"] = [{"thickness_m": float(d[s.range_m > 0].mean()), "index": float(index)}]
     inner = np.sqrt(1 - (np.sin(s.theta()) / index) ** 2)
     out = np.zeros(s.n)
     for frequency in np.linspace(286.5e9, 313.5e9, 9):
@@ -216,11 +251,11 @@ def correlated_shadowing(s, size, rng):
     g = np.where(a < 1.6, (3.535 * a + 2.181 * a**2) / (1 + 2.276 * a + 2.577 * a**2), 1.0)
     if s.material["distribution"] == "ggx":
         g = 2 / (1 + np.sqrt(1 + slope**2))
+    s.numbers["correlated-shadowing"] = [{"share": min(size, 1.0)}]
     s.lobe_gain = s.lobe_gain * g**-min(size, 1.0)
 
 
-def unknown(s, size, rng):
-    kind = UNKNOWN[rng.integers(len(UNKNOWN))]
+def unknown(s, size, rng, kind):
     x, y = s.surface.T
     if kind == "spiral":
         c = rng.uniform(-0.08, 0.08, 2)
@@ -233,15 +268,16 @@ def unknown(s, size, rng):
     else:
         wave = np.sign(np.sin(x / 0.02) * np.sin(y / 0.026))
     s.gain = s.gain * physics.mw(size * wave)
-    s.kind = kind
 
 
 EFFECTS = {
     "angle-error": angle_error, "anisotropy": anisotropy, "compression": compression, "covering-layer": covering_layer,
     "drift": drift, "finite-spot": finite_spot, "foreign-patch": foreign_patch, "fov-gain": fov_gain, "motion": motion,
     "multi-bounce": multi_bounce, "noise-floor": noise_floor, "pose": pose, "speckle": few_looks, "subsurface": subsurface,
-    "thin-film": thin_film, "correlated-shadowing": correlated_shadowing, "unknown": unknown,
+    "thin-film": thin_film, "correlated-shadowing": correlated_shadowing,
+    **{kind: functools.partial(unknown, kind=kind) for kind in UNKNOWN},
 }
+KNOWN = [n for n in EFFECTS if n not in UNKNOWN]
 # Sizes below and beyond which an effect would not be itself: a spot of less than 1 mm changes a few chirps at edges.
 START = {"finite-spot": 0.1}
 LIMIT = {"finite-spot": 3.2, "thin-film": 1.0, "correlated-shadowing": 1.0}
@@ -249,20 +285,46 @@ LIMIT = {"finite-spot": 3.2, "thin-film": 1.0, "correlated-shadowing": 1.0}
 BASES = {"multi-bounce": ["groove"], "correlated-shadowing": ["vase"]}
 
 
+def refit_columns(before, use):
+    """What small changes of level, lobe level, lobe width and the diffuse part's slope add to the powers in dB."""
+    theta, share = before.theta()[use], before.means_mw()[1][use]
+    law, step = before.law, 1e-3
+    steeper = np.log(law.bare(np.arctan(np.tan(theta) * (1 + step)), "lobe") / law.bare(theta, "lobe")) / step
+    return np.stack([np.ones(len(theta)), share, share * steeper, (1 - share) * np.log(np.cos(theta))], -1)
+
+
 def left_after_refit_db(before, after):
     """Rms change, dB, that level, lobe level, lobe width and the diffuse part's slope cannot follow."""
-    p0, share = before.means_mw()
-    p1, _ = after.means_mw()
+    p0, p1 = before.means_mw()[0], after.means_mw()[0]
     if after.ceiling_mw is not None:
         p1 = after.ceiling_mw * np.tanh(np.sqrt(p1 / after.ceiling_mw)) ** 2
     use = (before.range_m > 0) & (after.range_m > 0) & (p0 > physics.mw(physics.THRESHOLD_DBM))
-    theta = before.theta()[use]
-    law, step = before.law, 1e-3
-    steeper = np.log(law.bare(np.arctan(np.tan(theta) * (1 + step)), "lobe") / law.bare(theta, "lobe")) / step
-    share, change = share[use], (physics.db(p1) - physics.db(p0))[use]
-    columns = np.stack([np.ones(len(theta)), share, share * steeper, (1 - share) * np.log(np.cos(theta))], -1)
+    change, columns = (physics.db(p1) - physics.db(p0))[use], refit_columns(before, use)
     fitted = columns @ np.linalg.lstsq(columns, change, rcond=None)[0]
     return float(np.sqrt(np.mean((change - fitted) ** 2)))
+
+
+def stated_forms(s):
+    """Columns, dB per unit, of the forms of a gain that a report may state, by the names of their numbers."""
+    u, v = s.aim.T / 0.5
+    p = 2 * s.share - 1
+    drift = {"slope_db": p / 2, **{f"curve{n}_db": np.polynomial.Legendre.basis(n)(p) for n in range(2, 9)}}
+    field = {
+        "edge_db": u**2 + v**2, "slope_x_db": u, "slope_y_db": v,
+        "oval_db": u**2 - v**2, "twist_db": 2 * u * v, "steep_db": (u**2 + v**2) ** 2,
+    }
+    members = {"drift": (drift, (1, 3, 8)), "fov-gain": (field, (1, 3, 6))}
+    return {name: [dict(list(all_.items())[:n]) for n in counts] for name, (all_, counts) in members.items()}
+
+
+def numbers_of_gains(before, gain_db, use):
+    """Numbers of the stated forms of each gain: a fit without noise, of the laws and of the form, to the true gain."""
+    out, base = {}, refit_columns(before, use)
+    for name, form in ((n, f) for n in gain_db for f in stated_forms(before)[n]):
+        columns = np.concatenate([base, np.stack([c[use] for c in form.values()], -1)], 1)
+        fitted = np.linalg.lstsq(columns, gain_db[name][use], rcond=None)[0]
+        out.setdefault(name, []).append(dict(zip(form, map(float, fitted[base.shape[1]:]))))
+    return out
 
 
 def looks_for(declared, excess_db):

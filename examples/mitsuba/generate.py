@@ -3,11 +3,14 @@
 import argparse
 import copy
 import functools
+import glob
 import json
 import os
+from typing import NamedTuple
 
 import numpy as np
 
+import diagnoses
 import effects
 import physics
 import scan
@@ -16,6 +19,31 @@ from target_state import State
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 LOOKS = 4
+OWN_STRENGTH = ("noise-floor", "speckle")  # reached on every target
+
+
+class Plan(NamedTuple):
+    """A case before it is made."""
+
+    number: int
+    seed: int
+    labels: tuple = ()
+    strength: str = "strong"
+    speckle: str = "independent"  # or the waist, mm, of speckle that neighbours share
+    waist: str = "13.6"  # mm, with independent speckle
+    scan: str = "once"
+    base: str = ""  # none: the next by turns
+    level_sd: float = 1.5
+
+    def is_shared(self):
+        return self.speckle != "independent"
+
+    def waist_mm(self):
+        return float(self.speckle if self.is_shared() else self.waist)
+
+    def draw(self, index):
+        """Seed of the draws of an effect."""
+        return self.seed, self.number, 77 + index
 
 
 def write_cloud(path, power, range_m, ray, aim):
@@ -34,13 +62,17 @@ def write_cloud(path, power, range_m, ray, aim):
         file.write(head.encode() + rows.tobytes())
 
 
-def write_rays(path):
-    aim, time = scan.aims()
+def rays_file(pattern):
+    return "rays.csv" if pattern == "once" else f"rays-{pattern}.csv"
+
+
+def write_rays(path, pattern):
+    aim, time = scan.aims(pattern)
     ray, (x, y, z) = scan.directions(aim), scan.ORIGIN
-    with open(path, "w") as file:
-        file.write("chirp,time_s,ox_m,oy_m,oz_m,dx,dy,dz\n")
-        for i, (t, d) in enumerate(zip(time, ray)):
-            file.write(f"{i},{t:.6f},{x},{y},{z},{d[0]:.9f},{d[1]:.9f},{d[2]:.9f}\n")
+    lines = ["chirp,time_s,ox_m,oy_m,oz_m,dx,dy,dz\n"]
+    for i, (t, d) in enumerate(zip(time, ray)):
+        lines.append(f"{i},{t:.6f},{x},{y},{z},{d[0]:.9f},{d[1]:.9f},{d[2]:.9f}\n")
+    diagnoses.write_whole(path, "".join(lines).encode())
 
 
 def write_material(folder, slug, material, rng):
@@ -89,10 +121,11 @@ alpha = 0.5
     return {"m": m, "lobe": lobe, "rest": rest}
 
 
-def write_scene(path, name, slug, parts, speckle_mm, shared, looks, seed):
+def write_scene(path, name, slug, parts, plan, looks):
+    speckle_mm = plan.waist_mm()
     footprint = targets.MATERIALS[name]["footprint"]
     text = f"""name = "{name}"
-seed = {seed}
+seed = {plan.number}
 
 [radar]
 preset = "upm-300ghz"
@@ -109,11 +142,11 @@ edge_growth = 1.0
 
 [radar.scan]
 pattern = "rays"
-file = "../rays.csv"
+file = "../{rays_file(plan.scan)}"
 
 [radar.speckle]
 looks = {looks}
-form = "{'law' if shared else 'independent'}"
+form = "{'law' if plan.is_shared() else 'independent'}"
 
 [radar.noise]
 false_alarm_probability = {physics.FALSE_ALARM}
@@ -145,15 +178,32 @@ def add_looks(rng, looks, w0, state, shared):
 
 
 @functools.lru_cache
-def load(name):
+def load(name, pattern="once"):
+    """A base. What the chirps meet is stored for the scan `once`; for others Mitsuba traces it."""
     with np.load(f"{HERE}/bases/{name}.npz") as file:
-        return dict(file)
+        base = dict(file)
+    if pattern != "once":
+        import build_bases
+
+        base.update(build_bases.met(name, pattern))
+    return base
+
+
+def untouched(name, plan):
+    return State(load(name, plan.scan), name, physics.waist_m(plan.waist_mm()), plan.scan)
 
 
 @functools.lru_cache
-def calibrated(name, mm, label, strength, draw):
-    make = functools.partial(State, load(name), name, physics.waist_m(mm))
-    return effects.calibrate(make, label, strength, draw, LOOKS)
+def calibrated(name, plan, index):
+    """Size of an effect of a plan on a target, and what it leaves, dB."""
+    return effects.calibrate(lambda: untouched(name, plan), plan.labels[index], plan.strength, plan.draw(index), LOOKS)
+
+
+def reaches(name, plan):
+    """Whether every effect of a plan gets as strong as wanted on a target."""
+    goal = effects.RMS_DB[plan.strength]
+    left = [calibrated(name, plan, i)[1] for i, label in enumerate(plan.labels) if label not in OWN_STRENGTH]
+    return all(0.95 * goal <= rms <= 1.1 * goal for rms in left)
 
 
 def tilt_spread_db(state, size, use):
@@ -173,28 +223,69 @@ def range_gain(before, ranges, use):
     return float(np.sum(np.minimum(change**2 / 2, ceiling)))
 
 
-def case(out, number, name, labels, strength, speckle_mm, shared, seed, level_sd):
-    rng = np.random.default_rng([seed, number])
+@functools.lru_cache
+def generator():
+    """Digest of what a case depends on besides its plan."""
+    files = ["build_bases", "effects", "generate", "physics", "scan", "sets", "target_state", "targets"]
+    bases = [os.path.relpath(path, HERE) for path in sorted(glob.glob(f"{HERE}/bases/*.npz"))]
+    return diagnoses.digest(HERE, [f"{name}.py" for name in files] + bases)
+
+
+def truth_path(out, number):
+    return os.path.join(out, "truth", f"case-{number:03d}.json")
+
+
+def made(out, number, seed):
+    """Truth of a case of this number and seed that this generator has made, or None."""
+    try:
+        with open(truth_path(out, number)) as file:
+            truth = json.load(file)
+    except FileNotFoundError:
+        return None
+    return truth if truth.get("generator") == generator() and truth["plan"]["seed"] == seed else None
+
+
+def make(out, plan):
+    """Writes a case, its truth last, and returns the truth. One that is there of the same plan stays."""
+    truth, record = made(out, plan.number, plan.seed), {**plan._asdict(), "labels": list(plan.labels)}
+    if truth and truth["plan"] == record:
+        return truth
+    path = truth_path(out, plan.number)
+    if os.path.exists(path):
+        os.remove(path)
+    truth = {**case(out, plan), "plan": record, "generator": generator()}
+    os.makedirs(os.path.dirname(path), exist_ok=True)
+    diagnoses.write_whole(path, json.dumps(truth, indent=1).encode())
+    return truth
+
+
+def case(out, plan):
+    """Writes a case, and returns its truth."""
+    number, labels, shared, speckle_mm = plan.number, plan.labels, plan.is_shared(), plan.waist_mm()
+    name = plan.base or choose(plan)
+    rng = np.random.default_rng([plan.seed, number])
     w0 = physics.waist_m(speckle_mm)
-    base = load(name)
-    state, sizes, rms, kind = State(base, name, w0), {}, {}, None
+    before = untouched(name, plan)
+    state, sizes, rms = untouched(name, plan), {}, {}
     for index, label in enumerate(labels):
-        draw = (seed, number, 77 + index)
-        size, left = calibrated(name, speckle_mm, label, strength, draw)
-        effects.EFFECTS[label](state, size, np.random.default_rng(draw))
-        sizes[label], rms[label] = float(size), float(left)
-        kind = getattr(state, "kind", kind)
-    level = float(rng.normal(0, level_sd))
+        size, left = calibrated(name, plan, index)
+        effects.EFFECTS[label](state, size, np.random.default_rng(plan.draw(index)))
+        said = "unknown" if label in effects.UNKNOWN else label
+        sizes[said], rms[said] = float(size), float(left)
+    level = float(rng.normal(0, plan.level_sd))
     power, share = state.means_mw()
     power = power * physics.mw(level)
     if state.ceiling_mw is not None:
         state.ceiling_mw *= physics.mw(level)
+        state.numbers["compression"] = [{"saturation_dbm": float(physics.db(state.ceiling_mw))}]
     safe = np.where(state.range_m > 0, state.range_m, physics.FOCUS_M)
     delta2 = (physics.WAVELENGTH_M / (2 * np.pi * physics.beam_width_m(w0, safe))) ** 2
     steady = share * delta2 / (targets.MATERIALS[name]["m"] ** 2 + delta2)
     looks = state.looks or LOOKS
     fields = add_looks(rng, looks, w0, state, shared)
     declared_noise = physics.mean_noise_mw(LOOKS)
+    if "noise-floor" in labels:  # the power above the declared one
+        state.numbers["noise-floor"] = [{"level_dbm": float(physics.db(declared_noise * (state.noise_gain - 1)))}]
     ranges = np.where(state.range_m > 0, state.range_m + getattr(state, "echo_shift", 0), 0)
     seen, where, alarm = physics.detect(rng, power, steady, ranges, fields, declared_noise * state.noise_gain, state.ceiling_mw)
     folder = os.path.join(out, f"case-{number:03d}")
@@ -202,55 +293,60 @@ def case(out, number, name, labels, strength, speckle_mm, shared, seed, level_sd
     os.makedirs(folder, exist_ok=True)
     parts = targets.MESHES[name]()
     for part, (v, f) in enumerate(parts):
-        path = os.path.join(out, "meshes", f"{name}-{part}.ply")
-        if not os.path.exists(path):
-            targets.write_ply(path, v, f)
-    rays = os.path.join(out, "rays.csv")
-    if not os.path.exists(rays):
-        write_rays(rays)
+        diagnoses.write_whole(os.path.join(out, "meshes", f"{name}-{part}.ply"), targets.ply(v, f))
+    write_rays(os.path.join(out, rays_file(plan.scan)), plan.scan)
     slug = f"judge-{number:03d}"
     start = write_material(os.path.join(folder, "material"), slug, targets.MATERIALS[name], rng)
-    write_scene(os.path.join(folder, "scene.toml"), name, slug, len(parts), speckle_mm, shared, LOOKS, number)
+    write_scene(os.path.join(folder, "scene.toml"), name, slug, len(parts), plan, LOOKS)
     write_cloud(os.path.join(folder, "cloud.ply"), seen, where, state.ray, state.aim)
     hit, echo = state.range_m > 0, np.isfinite(seen) & ~alarm
+    both = echo & (before.range_m > 0)
     truth = {
-        "base": name, "labels": labels, "strength": strength if labels else None, "kind": kind, "sizes": sizes,
-        "left_after_refit_db": rms,
-        "reaches_strength": all(0.95 <= rms[n] / effects.RMS_DB[strength] <= 1.1 or n in ("speckle", "noise-floor") for n in labels),
+        "base": name, "labels": list(sizes), "strength": plan.strength if labels else None,
+        "kind": next((n for n in labels if n in effects.UNKNOWN), None), "sizes": sizes,
+        "numbers": {**state.numbers, **effects.numbers_of_gains(before, state.gain_db, both)},
+        "left_after_refit_db": rms, "reaches_strength": reaches(name, plan),
         "level_offset_db": level, "speckle": f"shared, w0 = {speckle_mm} mm" if shared else "independent",
         "looks": float(looks), "declared_looks": LOOKS,
         "noise_dbm": float(physics.db(declared_noise * state.noise_gain)),
         "chirps": state.n, "hits": int(hit.sum()), "detections": int(np.isfinite(seen).sum()), "false_alarms": int(alarm.sum()),
-        "silent_share_of_hits": float(np.mean(~np.isfinite(seen[base["range_m"] > 0]))),
-        "range_gain": range_gain(State(base, name, w0), ranges, echo),
+        "silent_share_of_hits": float(np.mean(~np.isfinite(seen[before.range_m > 0]))),
+        "range_gain": range_gain(before, ranges, echo), "rays": rays_file(plan.scan),
         "law": {k: v for k, v in targets.MATERIALS[name].items()}, "start": start,
     }
     if "angle-error" in labels:
         truth["tilt_spread_db"] = tilt_spread_db(state, sizes["angle-error"], echo)
-    os.makedirs(os.path.join(out, "truth"), exist_ok=True)
-    with open(os.path.join(out, "truth", f"case-{number:03d}.json"), "w") as file:
-        json.dump(truth, file, indent=1)
     return truth
 
 
-def choose(allowed, number, labels, arguments, mm):
+def choose(plan):
     """The next target by turns on which every effect reaches its strength; else the first of them."""
-    turn = (number + arguments.seed) % len(allowed)
-    order = allowed[turn:] + allowed[:turn]
-    for name in order:
-        reached = True
-        for index, label in enumerate(labels):
-            draw = (arguments.seed, number, 77 + index)
-            goal = effects.RMS_DB[arguments.strength] if label not in ("speckle", "noise-floor") else 0
-            left = calibrated(name, mm, label, arguments.strength, draw)[1]
-            reached = reached and 0.95 * goal <= left <= 1.1 * goal
-        if reached:
-            return name
-    return order[0]
+    order = allowed(plan)
+    return next((name for name in order if reaches(name, plan)), order[0])
+
+
+def allowed(plan):
+    """Targets that have what the effects need, from the next by turns on."""
+    names = [b for b in targets.MATERIALS if all(b in effects.BASES.get(n, [b]) for n in plan.labels)]
+    turn = (plan.number + plan.seed) % max(len(names), 1)
+    return names[turn:] + names[:turn]
 
 
 # Geometry first; added power after gains on the surface.
 ORDER = ["motion", "pose", "finite-spot", "angle-error", "anisotropy", "foreign-patch"]
+
+
+def in_order(labels):
+    return tuple(sorted(labels, key=lambda n: ORDER.index(n) if n in ORDER else len(ORDER)))
+
+
+def labels_of(effect, number):
+    """Names of effects from how they are asked for; the kinds of `unknown` by turns."""
+    if effect == "none":
+        return ()
+    if effect == "unknown":
+        return (effects.UNKNOWN[number % len(effects.UNKNOWN)],)
+    return in_order(effect.split("+"))
 
 
 def main():
@@ -261,28 +357,23 @@ def main():
     parser.add_argument("--strength", default="strong", choices=list(effects.RMS_DB))
     parser.add_argument("--speckle", default="independent", choices=["independent", "8", "13.6", "19.2"])
     parser.add_argument("--waist", default="13.6", choices=["8", "13.6", "19.2"], help="waist, mm, with independent speckle")
-    parser.add_argument("--base", choices=list(targets.MATERIALS), help="always this target [default: by turns]")
+    parser.add_argument("--scan", default="once", choices=list(scan.PATTERNS), help="which places are met in which order")
+    parser.add_argument("--base", default="", choices=list(targets.MATERIALS), help="always this target [default: by turns]")
     parser.add_argument("--count", type=int, default=1, help="cases for each effect")
     parser.add_argument("--level-sd", type=float, default=1.5, help="standard deviation of the level's offset, dB")
     parser.add_argument("--first", type=int, default=0, help="number of the first case")
     arguments = parser.parse_args()
-    names = [n for n in effects.EFFECTS if n != "unknown"] if arguments.effect == "all" else [arguments.effect]
-    shared = arguments.speckle != "independent"
-    mm = float(arguments.speckle if shared else arguments.waist)
-    number = arguments.first
+    names = effects.KNOWN if arguments.effect == "all" else [arguments.effect]
     for effect in names:
-        labels = [] if effect == "none" else effect.split("+")
-        for label in labels:
-            if label not in effects.EFFECTS:
+        for label in effect.split("+"):
+            if label not in [*effects.EFFECTS, "unknown", "none"]:
                 parser.error(f"{label} is not an effect; choose from {', '.join(effects.EFFECTS)}")
-        labels.sort(key=lambda n: ORDER.index(n) if n in ORDER else len(ORDER))
-        allowed = [b for b in targets.MATERIALS if all(b in effects.BASES.get(n, [b]) for n in labels)]
-        for _ in range(arguments.count):
-            base = arguments.base or choose(allowed, number, labels, arguments, mm)
-            t = case(arguments.out, number, base, labels, arguments.strength, mm, shared, arguments.seed, arguments.level_sd)
-            print(f"case-{number:03d} {base} {'+'.join(labels) or 'none'} {t['left_after_refit_db']}: "
-                  f"{t['detections']} detections, {t['silent_share_of_hits']:.2f} of the hits silent, {t['false_alarms']} false alarms")
-            number += 1
+    given = {name: getattr(arguments, name) for name in Plan._fields if hasattr(arguments, name)}
+    for number, effect in enumerate((n for n in names for _ in range(arguments.count)), arguments.first):
+        t = make(arguments.out, Plan(number, labels=labels_of(effect, number), **given))
+        labels = t["plan"]["labels"]
+        print(f"case-{number:03d} {t['base']} {'+'.join(labels) or 'none'} {t['left_after_refit_db']}: "
+              f"{t['detections']} detections, {t['silent_share_of_hits']:.2f} of the hits silent, {t['false_alarms']} false alarms")
 
 
 if __name__ == "__main__":

@@ -9,10 +9,10 @@ import targets
 
 
 class State:
-    def __init__(self, base, name, w0):
-        self.base, self.name, self.w0, self.law = base, name, w0, physics.Law(base, w0)
+    def __init__(self, base, name, w0, pattern="once"):
+        self.base, self.name, self.w0, self.pattern, self.law = base, name, w0, pattern, physics.Law(base, w0)
         self.material = targets.MATERIALS[name]
-        self.aim, self.time_s = scan.aims()
+        self.aim, self.time_s = scan.aims(pattern)
         self.n = len(self.aim)
         self.share = (np.arange(self.n) + 0.5) / self.n
         self.ray = scan.directions(self.aim)
@@ -26,6 +26,8 @@ class State:
         self.spread, self.spread_share = None, None  # what replaces the mean power and the share of the lobe
         self.draft = False  # while a size is sought, an effect may do with fewer chirps and leave the others silent
         self.ceiling_mw, self.noise_gain, self.looks = None, 1.0, None
+        self.numbers = {}  # of each effect: forms that a report may state, as parameters with their true numbers
+        self.gain_db = {}  # of an effect that is a gain: the gain of each chirp
         self.tilt = np.zeros(self.n)
         self.grid_x, self.grid_y = scan.grid()
         shape = (len(self.grid_y), len(self.grid_x))
@@ -64,9 +66,9 @@ class State:
         safe = np.where(hit, self.range_m, 8.0)
         theta = np.where(hit, self.theta(), 0.0)
         lobe, rest = self.parts_mw(theta, safe, self.slope_scale if np.any(self.slope_scale != 1) else 1.0)
-        lobe, rest = lobe * self.lobe_gain * self.gain, rest * self.rest_gain * self.gain
-        total = np.where(hit, lobe + rest + self.added_mw, 0.0)
-        share = lobe / (lobe + rest + self.added_mw)
+        lobe, rest = lobe * self.lobe_gain, rest * self.rest_gain
+        whole = lobe + rest + self.added_mw
+        total, share = np.where(hit, whole * self.gain, 0.0), lobe / whole
         if self.spread is not None:
             total, share = np.where(hit, self.spread * self.gain, 0.0), self.spread_share
         return total, share

@@ -127,7 +127,7 @@ MESHES = {
 }
 
 
-def write_ply(path, vertices, faces):
+def ply(vertices, faces):
     """Binary PLY of triangles."""
     head = (
         "ply\nformat binary_little_endian 1.0\n"
@@ -136,8 +136,12 @@ def write_ply(path, vertices, faces):
     )
     record = np.zeros(len(faces), dtype=[("n", "u1"), ("v", "<i4", 3)])
     record["n"], record["v"] = 3, faces
+    return head.encode() + np.asarray(vertices, "<f8").tobytes() + record.tobytes()
+
+
+def write_ply(path, vertices, faces):
     with open(path, "wb") as file:
-        file.write(head.encode() + np.asarray(vertices, "<f8").tobytes() + record.tobytes())
+        file.write(ply(vertices, faces))
 
 
 # Share of the diffuse part, lobes as (weight, kind, m, reflectance), reflectance of the diffuse part. What the
