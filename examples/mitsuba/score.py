@@ -8,66 +8,14 @@ import functools
 import json
 import math
 import os
-import shutil
-import subprocess
-import time
+
+import diagnoses
+from intervals import intervals
 
 
 IN_THE_DATA = 5.0  # gain in ln p below which not even the true form can be seen
 FALSE_ALARM = 3e-4  # declared, of a gate without an echo
 LEFT_DB = {"strong": 1.33, "moderate": 0.665, "weak": 0.33}
-
-
-def diagnose(matdb, folder, seed):
-    """report.json of a case, with the seconds and the words if it failed. A report newer than cloud and program stays."""
-    db, out = os.path.join(folder, "matdb.sqlite"), os.path.join(folder, f"diagnosis-{seed}")
-    start = time.time()
-    if not os.path.exists(db):
-        added = subprocess.run([matdb, "--db", db, "-q", "add", "--from", os.path.join(folder, "material")], capture_output=True, text=True)
-        if added.returncode != 0:
-            return {"verdict": "crash", "words": added.stderr.strip()}
-    report = os.path.join(out, "report.json")
-    if os.path.exists(report):
-        inputs = [os.path.join(folder, "cloud.ply"), os.path.join(folder, "scene.toml"), shutil.which(matdb) or matdb]
-        if os.path.getmtime(report) > max(map(os.path.getmtime, inputs)):
-            with open(report) as file:
-                return {**json.load(file), "words": ""}
-        os.remove(report)
-    run = subprocess.run(
-        [matdb, "--db", db, "-q", "diagnose", os.path.join(folder, "cloud.ply"), "--scene", os.path.join(folder, "scene.toml"), "--seed", str(seed), "-o", out],
-        capture_output=True, text=True)
-    answer = {"verdict": "crash"}
-    if os.path.exists(report):
-        with open(report) as file:
-            answer = json.load(file)
-    answer.update(seconds=time.time() - start, status=run.returncode, words=run.stderr.strip())
-    return answer
-
-
-def intervals(answer, truth):
-    """(name, value, sd, truth, holds) of what the report states and the truth knows."""
-    out, effects = [], {e["name"]: e["parameters"] for e in answer.get("effects", [])}
-    known = {
-        "speckle": {"looks": truth["looks"]},
-        "angle-error": {"sd_deg": truth["sizes"].get("angle-error")},
-        "noise-floor": {},
-    }
-    if "noise-floor" in truth["labels"]:
-        # the power above the declared one
-        total = 10 ** (truth["noise_dbm"] / 10)
-        known["noise-floor"]["level_dbm"] = 10 * math.log10(total - total / 10 ** (truth["sizes"]["noise-floor"] / 10))
-    for name in effects:
-        for key, value in known.get(name, {}).items():
-            if name in truth["labels"] and key in effects[name] and effects[name][key].get("sd"):
-                p = effects[name][key]
-                out.append((f"{name}.{key}", p["value"], p["sd"], value))
-    # m of the law: only where the law has that number and nothing changes the lobe itself
-    clean = set(truth["labels"]) <= {"drift", "fov-gain", "noise-floor", "speckle", "covering-layer", "motion", "pose"}
-    if truth["law"]["kind"] == "blend" and clean:
-        for p in answer.get("base", {}).get("parameters", []):
-            if p["name"] == "specular.m" and p["sd"]:
-                out.append(("law m", p["value"], p["sd"], truth["law"]["m"]))
-    return [(n, v, s, t, abs(v - t) <= 1.96 * s) for n, v, s, t in out]
 
 
 @functools.lru_cache
@@ -107,7 +55,7 @@ def expected_gain(truth, folder):
     echoes, looks = truth["detections"] - truth["false_alarms"], truth.get("declared_looks", 4)
     share = 1.0
     if truth["speckle"].startswith("shared"):
-        share = independent_share(os.path.join(folder, "rays.csv"), float(truth["speckle"].split()[-2]) / 1000)
+        share = independent_share(os.path.join(folder, truth.get("rays", "rays.csv")), float(truth["speckle"].split()[-2]) / 1000)
     out = {}
     for label in truth["labels"]:
         left = truth["left_after_refit_db"][label] * math.log(10) / 10  # nepers of power
@@ -146,71 +94,96 @@ def judge(answer, truth, gains):
     return "not in the data" if min(gains.values()) < IN_THE_DATA else kind, good, said
 
 
+class Score:
+    """What became of cases, by their kind."""
+
+    def __init__(self):
+        self.right, self.total = collections.Counter(), collections.Counter()
+        self.held, self.stated = collections.Counter(), collections.Counter()  # intervals, by the name of the number
+        self.alarms, self.confusion = collections.Counter(), collections.Counter()
+        self.misses, self.apart, self.seconds = [], [], []
+
+    def add(self, case, truth, answer, gains):
+        kind, good, said = judge(answer, truth, gains)
+        self.total[kind] += 1
+        self.right[kind] += good
+        for name, value, sd, true, holds in intervals(answer, truth):
+            self.stated[name] += 1
+            self.held[name] += holds
+            if not holds:
+                self.misses.append(f"{case} {truth['base']}: interval of {name}: {value:.4g} +- {sd:.2g}, truth {true:.4g}")
+        self.confusion["+".join(truth["labels"]) or "none", "+".join(said) or answer["verdict"]] += 1
+        if kind == "complete" and not good:
+            self.alarms["named" if said else answer["verdict"]] += 1
+        if "seconds" in answer:
+            self.seconds.append(answer["seconds"])
+        if not good or kind == "not in the data":
+            (self.apart if kind == "not in the data" else self.misses).append(in_words(case, truth, answer, gains, said))
+
+    def update(self, other):
+        for name in ("right", "total", "held", "stated", "alarms", "confusion"):
+            getattr(self, name).update(getattr(other, name))
+        self.misses, self.apart, self.seconds = self.misses + other.misses, self.apart + other.apart, self.seconds + other.seconds
+
+    def print(self):
+        print("right first name (pairs: both; unknown: unexplained and no name; complete: nothing missing):")
+        for kind in self.total:
+            if kind != "not in the data":
+                print(f"  {kind:16} {self.right[kind]:4} of {self.total[kind]}")
+        if self.apart:
+            print(f"  not in the data: {len(self.apart)} cases, {self.right['not in the data']} of them right all the same")
+        if self.alarms:
+            print("  complete scans that were called otherwise:", ", ".join(f"{n} {what}" for what, n in self.alarms.items()))
+        print(f"95 % intervals that hold the truth: {self.held.total()} of {self.stated.total()}")
+        for name, count in sorted(self.stated.items()):
+            print(f"  {name:32} {self.held[name]:4} of {count}")
+        if self.seconds:
+            seconds = sorted(self.seconds)
+            print(f"seconds a case: median {seconds[len(seconds) // 2]:.1f}, worst {seconds[-1]:.1f}")
+        print("truth -> said:")
+        for (truth, said), count in sorted(self.confusion.items()):
+            print(f"  {truth:28} -> {said:32} {count}")
+        print("misses:" if self.misses else "no misses")
+        for line in self.misses:
+            print(" ", line)
+        if self.apart:
+            print(f"not in the data (the true form itself is expected to gain less than {IN_THE_DATA:g} in ln p):")
+            for line in self.apart:
+                print(" ", line)
+
+
+def in_words(case, truth, answer, gains, said):
+    left = ", ".join(f"{u.get('covariate')} {u.get('strength_db') or 0:.2f} dB" for u in answer.get("unexplained", []))
+    words = "" if said or left else f" [{answer.get('reason') or answer['words'][-200:]}]"
+    gain = ", ".join(f"{v:.1f} for {g}" for g, v in gains.items()) or "none"
+    if set(truth["labels"]) & {"finite-spot", "multi-bounce"}:
+        gain += f", by ranges {truth.get('range_gain', 0.0):.0f} more"
+    return (f"{case} {truth['base']} {'+'.join(truth['labels']) or 'none'} ({truth['strength']}, {truth.get('kind')}, "
+            f"{truth['speckle']}, level {truth['level_offset_db']:+.1f} dB; expected gain {gain}): "
+            f"{answer['verdict']}, said {'+'.join(said) or 'nothing'}; left: {left or 'nothing'}{words}")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder")
     parser.add_argument("--matdb", default="matdb")
+    parser.add_argument("--key", help="key of the program's sources, where it is no build of this tree")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--jobs", type=int, default=2, help="diagnoses at once")
     parser.add_argument("--strict", action="store_true", help="exit with 1 unless every case is right")
     arguments = parser.parse_args()
-    names = sorted(n for n in os.listdir(arguments.folder) if n.startswith("case-"))
-    truths = {}
-    for n in names:
-        with open(os.path.join(arguments.folder, "truth", f"{n}.json")) as file:
-            truths[n] = json.load(file)
+    program, folder = diagnoses.Program(arguments.matdb, arguments.key), arguments.folder
+    print(f"judged: {program}")
+    names = sorted(n for n in os.listdir(folder) if n.startswith("case-"))
     with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
-        answers = dict(zip(names, pool.map(lambda n: diagnose(arguments.matdb, os.path.join(arguments.folder, n), arguments.seed), names)))
-    right, total, held, confusion = collections.Counter(), collections.Counter(), [], collections.Counter()
-    misses, apart = [], []
-    alarms = collections.Counter()
-    for n in names:
-        truth, answer = truths[n], answers[n]
-        gains = expected_gain(truth, arguments.folder)
-        kind, good, said = judge(answer, truth, gains)
-        total[kind] += 1
-        right[kind] += good
-        for i in intervals(answer, truth):
-            held.append(i[4])
-            if not i[4]:
-                misses.append(f"{n} {truth['base']}: interval of {i[0]}: {i[1]:.4g} +- {i[2]:.2g}, truth {i[3]:.4g}")
-        confusion["+".join(truth["labels"]) or "none", "+".join(said) or answer["verdict"]] += 1
-        if kind == "complete":
-            alarms["named"] += bool(said)
-            alarms["unexplained"] += not said and answer["verdict"] == "unexplained"
-        left = ", ".join(f"{u.get('covariate')} {u.get('strength_db') or 0:.2f} dB" for u in answer.get("unexplained", []))
-        if not good or kind == "not in the data":
-            words = "" if said or left else f" [{answer.get('reason') or answer['words'][-200:]}]"
-            gain = ", ".join(f"{v:.1f} for {g}" for g, v in gains.items()) or "none"
-            if set(truth["labels"]) & {"finite-spot", "multi-bounce"}:
-                gain += f", by ranges {truth.get('range_gain', 0.0):.0f} more"
-            (apart if kind == "not in the data" else misses).append(
-                f"{n} {truth['base']} {'+'.join(truth['labels']) or 'none'} ({truth['strength']}, {truth.get('kind')}, "
-                f"{truth['speckle']}, level {truth['level_offset_db']:+.1f} dB; expected gain {gain}): "
-                f"{answer['verdict']}, said {'+'.join(said) or 'nothing'}; left: {left or 'nothing'}{words}")
-    print("right first name (pairs: both; unknown: unexplained and no name; complete: nothing missing):")
-    for kind in total:
-        if kind != "not in the data":
-            print(f"  {kind:16} {right[kind]:4} of {total[kind]}")
-    if apart:
-        print(f"  not in the data: {len(apart)} cases, {right['not in the data']} of them right all the same")
-    if total["complete"]:
-        print(f"  complete scans with a named effect: {alarms['named']}, called unexplained: {alarms['unexplained']}, of {total['complete']}")
-    print(f"95 % intervals that hold the truth: {sum(held)} of {len(held)}")
-    seconds = sorted(a["seconds"] for a in answers.values() if "seconds" in a)
-    if seconds:
-        print(f"seconds a case: median {seconds[len(seconds) // 2]:.1f}, worst {seconds[-1]:.1f} ({arguments.jobs} at once)")
-    print("truth -> said:")
-    for (truth, said), count in sorted(confusion.items()):
-        print(f"  {truth:28} -> {said:32} {count}")
-    print("misses:" if misses else "no misses")
-    for m in misses:
-        print(" ", m)
-    if apart:
-        print(f"not in the data (the true form itself is expected to gain less than {IN_THE_DATA:g} in ln p):")
-        for m in apart:
-            print(" ", m)
-    if arguments.strict and (not names or right != total):
+        answers = list(pool.map(lambda n: diagnoses.diagnose(program, os.path.join(folder, n), arguments.seed), names))
+    score = Score()
+    for name, answer in zip(names, answers):
+        with open(os.path.join(folder, "truth", f"{name}.json")) as file:
+            truth = json.load(file)
+        score.add(name, truth, answer, expected_gain(truth, folder))
+    score.print()
+    if arguments.strict and (not names or score.right != score.total):
         raise SystemExit(1)
 
 
