@@ -1,0 +1,133 @@
+"""The study of false alarms and the judgement over all effects: make the cases, diagnose them, print one table.
+
+Stop it at any point. The next run goes on with what is missing, as long as the sources of the program, the scripts that
+make cases and --seed are the same."""
+
+import argparse
+import concurrent.futures
+import json
+import os
+import time
+
+import diagnoses
+import generate
+import score
+import sets
+
+PARTS = ("alarms", "mitsuba")
+
+
+def run(folder, index, n, number, seed, program, deadline):
+    """Makes and diagnoses one case, unless the time is over."""
+    out = os.path.join(folder, sets.SETS[index][1])
+    if time.time() > deadline:
+        return
+    if not generate.made(out, number, seed):
+        generate.make(out, sets.SETS[index][3](n, number, seed))
+    answer = diagnoses.diagnose(program, os.path.join(out, f"case-{number:03d}"), 0)
+    said = "+".join(e["name"] for e in answer.get("effects", [])) or "nothing"
+    print(f"{sets.SETS[index][1]} case-{number:03d}: {answer['verdict']}, said {said}", flush=True)
+
+
+def scored(folder, index, seed, program):
+    """Score of the cases of a set that are done, and their number."""
+    out, result, done = os.path.join(folder, sets.SETS[index][1]), score.Score(), 0
+    for _, number in sets.cases(index, 10**6):
+        truth, case = generate.made(out, number, seed), os.path.join(out, f"case-{number:03d}")
+        answer = diagnoses.kept(program.key, case, 0) if truth else None
+        if answer:
+            done += 1
+            result.add(f"{sets.SETS[index][1]} case-{number:03d}", truth, answer, score.expected_gain(truth, out))
+    return result, done
+
+
+def row(what, count, total, target, met, complete):
+    share = f"{100 * count / total:5.1f} %" if total else "   -   "
+    words = ("met" if met else "MISSED") if complete else "not all done"
+    print(f"  {what:44} {count:4} of {total:<5} {share}   {target:12} {words}")
+
+
+def table(scores, done):
+    """One line for each target. `scores` and `done` are by the name of the set."""
+    size = {name: count for _, name, count, _ in sets.SETS}
+
+    def whole(names):
+        return all(done[n] == size[n] for n in names)
+
+    def merged(names):
+        result = score.Score()
+        for name in names:
+            result.update(scores[name])
+        return result
+
+    def rate(what, names, kind, least):
+        s = merged(names)
+        row(what, s.right[kind], s.total[kind], f">= {least} %", 100 * s.right[kind] >= least * s.total[kind], whole(names))
+
+    def at_most(what, names, most):
+        s = merged(names)
+        wrong = s.total["complete"] - s.right["complete"]
+        row(what, wrong, s.total["complete"], f"<= {most}", wrong <= most, whole(names))
+
+    strengths = ["strong", "moderate", "weak"]
+    judged = [name for part, name, _, _ in sets.SETS if part == "mitsuba"]
+    complete = [n for n in judged if n.startswith("complete")]
+    for kind, least in zip(strengths, (95, 90, 85)):
+        rate(f"right name first, {kind}", strengths, kind, least)
+    rate("both of a pair", ["pairs"], "pair", 85)
+    rate("unknown called unexplained", ["unknown"], "unknown", 95)
+    s = merged(complete)
+    wrong = s.total["complete"] - s.right["complete"]
+    row("false alarms on complete scans", wrong, s.total["complete"], "<= 3 %", 100 * wrong <= 3 * s.total["complete"], whole(complete))
+    s = merged(judged)
+    for what, of_laws in (("95 % intervals of effects that hold", False), ("95 % intervals of laws and level that hold", True)):
+        names = [n for n in s.stated if n.startswith("law.") == of_laws]
+        held, stated = (sum(c[n] for n in names) for c in (s.held, s.stated))
+        row(what, held, stated, ">= 90 %", 10 * held >= 9 * stated, whole(judged))
+    short = [name for part, name, _, _ in sets.SETS if part == "alarms" and name != "alarms-long"]
+    for name in short:
+        at_most(f"false alarms, {name.removeprefix('alarms-')}", [name], 5)
+    at_most("false alarms, all of these", short, 12)
+    at_most("false alarms, 18 529 chirps", ["alarms-long"], 1)
+    s = merged(strengths + ["pairs"])
+    for kind in ("below weak", "not in the data"):
+        print(f"  {kind}, which have no target: {s.right[kind]} of {s.total[kind]} right")
+
+
+def main():
+    names = [name for _, name, _, _ in sets.SETS]
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("part", choices=[*PARTS, "table"], help="which study to go on with; `table`: only what is done")
+    parser.add_argument("sets", nargs="*", metavar="SET", help=f"only these sets of it: {', '.join(names)}")
+    parser.add_argument("--out", required=True)
+    parser.add_argument("--seed", type=int, required=True)
+    parser.add_argument("--matdb", default="matdb")
+    parser.add_argument("--key", help="key of the program's sources, where it is no build of this tree")
+    parser.add_argument("--jobs", type=int, default=2, help="cases at once")
+    parser.add_argument("--count", type=int, default=10**6, help="only the first cases of each set")
+    parser.add_argument("--minutes", type=float, default=1e6, help="begin no case after this time")
+    arguments = parser.parse_args()
+    ours = [name for part, name, _, _ in sets.SETS if part == arguments.part]
+    for name in arguments.sets:
+        if name not in ours:
+            parser.error(f"{name} is not a set of {arguments.part}; choose from {', '.join(ours)}")
+    program, deadline = diagnoses.Program(arguments.matdb, arguments.key), time.time() + 60 * arguments.minutes
+    with concurrent.futures.ProcessPoolExecutor(arguments.jobs) as pool:
+        running = [
+            pool.submit(run, arguments.out, names.index(name), n, number, arguments.seed, program, deadline)
+            for name in arguments.sets or ours for n, number in sets.cases(names.index(name), arguments.count)]
+        for future in running:
+            future.result()
+    found = [scored(arguments.out, index, arguments.seed, program) for index in range(len(names))]
+    scores, done = ({name: f[i] for name, f in zip(names, found)} for i in (0, 1))
+    everything = score.Score()
+    for s in scores.values():
+        everything.update(s)
+    everything.print()
+    print(f"judged: {program}; cases by {generate.generator()}, seed {arguments.seed}")
+    print("done: " + ", ".join(f"{name} {done[name]} of {count}" for _, name, count, _ in sets.SETS))
+    table(scores, done)
+
+
+if __name__ == "__main__":
+    main()
