@@ -3,12 +3,13 @@
 import hashlib
 import json
 import os
+import re
 import shutil
 import subprocess
 import time
 import tomllib
 
-ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.realpath(__file__))))
 # Sources that change no number of a diagnosis: publications, flags and printing, reports of a scan and of a curve,
 # and how a page looks. Everything else in src may, adding a material and choosing what is tried included.
 APART = ("src/catalogue/", "src/cli/", "src/report/curve/", "src/report/scan/", "src/report/templates/")
@@ -52,10 +53,10 @@ class Program:
         """Whether cargo has listed the sources of the program, which then are this tree's and older than it."""
         try:
             with open(self.path + ".d") as file:
-                listed = file.read().split(": ", 1)[1].split()
+                listed = re.split(r"(?<!\\) ", file.read().split(": ", 1)[1].strip())
         except (FileNotFoundError, IndexError):
             return False
-        for path in listed:
+        for path in (os.path.realpath(p.replace("\\ ", " ")) for p in listed):
             if not path.startswith(ROOT + os.sep):
                 raise SystemExit(f"{self.path} was built from {path}: judge it from its own tree, or state its sources' key as --key")
             if not os.path.exists(path) or os.path.getmtime(path) > os.path.getmtime(self.path):

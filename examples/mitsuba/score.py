@@ -174,12 +174,15 @@ def main():
     arguments = parser.parse_args()
     program, folder = diagnoses.Program(arguments.matdb, arguments.key), arguments.folder
     print(f"judged: {program}")
-    names = sorted(n for n in os.listdir(folder) if n.startswith("case-"))
+    truths = os.path.join(folder, "truth")  # a case has one once it is whole
+    if not os.path.isdir(truths):
+        raise SystemExit(f"{folder} has no cases: generate.py makes some")
+    names = sorted(n.removesuffix(".json") for n in os.listdir(truths) if n.endswith(".json"))
     with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
         answers = list(pool.map(lambda n: diagnoses.diagnose(program, os.path.join(folder, n), arguments.seed), names))
     score = Score()
     for name, answer in zip(names, answers):
-        with open(os.path.join(folder, "truth", f"{name}.json")) as file:
+        with open(os.path.join(truths, f"{name}.json")) as file:
             truth = json.load(file)
         score.add(name, truth, answer, expected_gain(truth, folder))
     score.print()

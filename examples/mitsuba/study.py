@@ -5,8 +5,9 @@ make cases and --seed are the same."""
 
 import argparse
 import concurrent.futures
-import json
+import multiprocessing
 import os
+import signal
 import time
 
 import diagnoses
@@ -20,13 +21,20 @@ PARTS = ("alarms", "mitsuba")
 def run(folder, index, n, number, seed, program, deadline):
     """Makes and diagnoses one case, unless the time is over."""
     out = os.path.join(folder, sets.SETS[index][1])
-    if time.time() > deadline:
+    if STOP.is_set() or time.time() > deadline:
         return
     if not generate.made(out, number, seed):
         generate.make(out, sets.SETS[index][3](n, number, seed))
     answer = diagnoses.diagnose(program, os.path.join(out, f"case-{number:03d}"), 0)
     said = "+".join(e["name"] for e in answer.get("effects", [])) or "nothing"
     print(f"{sets.SETS[index][1]} case-{number:03d}: {answer['verdict']}, said {said}", flush=True)
+
+
+def begin_worker(stop):
+    """Workers finish their case when the study is interrupted, and begin no other once `stop` is set."""
+    global STOP
+    STOP = stop
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def scored(folder, index, seed, program):
@@ -112,12 +120,17 @@ def main():
         if name not in ours:
             parser.error(f"{name} is not a set of {arguments.part}; choose from {', '.join(ours)}")
     program, deadline = diagnoses.Program(arguments.matdb, arguments.key), time.time() + 60 * arguments.minutes
-    with concurrent.futures.ProcessPoolExecutor(arguments.jobs) as pool:
+    stop = multiprocessing.Event()
+    with concurrent.futures.ProcessPoolExecutor(arguments.jobs, initializer=begin_worker, initargs=(stop,)) as pool:
         running = [
             pool.submit(run, arguments.out, names.index(name), n, number, arguments.seed, program, deadline)
             for name in arguments.sets or ours for n, number in sets.cases(names.index(name), arguments.count)]
-        for future in running:
-            future.result()
+        try:
+            for future in running:
+                future.result()
+        except KeyboardInterrupt:
+            print("stopped: waiting for the cases that run; the same command goes on with the others", flush=True)
+            stop.set()
     found = [scored(arguments.out, index, arguments.seed, program) for index in range(len(names))]
     scores, done = ({name: f[i] for name, f in zip(names, found)} for i in (0, 1))
     everything = score.Score()
