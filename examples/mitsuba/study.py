@@ -114,6 +114,7 @@ def main():
     parser.add_argument("--jobs", type=int, default=2, help="cases at once")
     parser.add_argument("--count", type=int, default=10**6, help="only the first cases of each set")
     parser.add_argument("--minutes", type=float, default=1e6, help="begin no case after this time")
+    parser.add_argument("--strict", action="store_true", help="exit with 1 unless every case that is done is right")
     arguments = parser.parse_args()
     ours = [name for part, name, _, _ in sets.SETS if part == arguments.part]
     for name in arguments.sets:
@@ -140,6 +141,8 @@ def main():
     print(f"judged: {program}; cases by {generate.generator()}, seed {arguments.seed}")
     print("done: " + ", ".join(f"{name} {done[name]} of {count}" for _, name, count, _ in sets.SETS))
     table(scores, done)
+    if arguments.strict and (not everything.total or everything.right != everything.total):
+        raise SystemExit(1)
 
 
 if __name__ == "__main__":
