@@ -141,6 +141,14 @@ pub enum Error {
         /// Why the search ended.
         stop: &'static str,
     },
+    /// An answer that could not be stored or drawn, and its numbers that could be written.
+    #[error("{error}; nothing was stored, and the answer is in {}", report.display())]
+    Unstored {
+        /// What is wrong.
+        error: Box<Error>,
+        /// The file with the answer.
+        report: PathBuf,
+    },
     /// Nothing can be said about a cloud.
     #[error(transparent)]
     Diagnose(#[from] DiagnoseError),

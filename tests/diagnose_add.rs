@@ -263,9 +263,31 @@ fn a_file_that_cannot_be_written_leaves_database_and_files_as_they_were() {
     run(at, &["add", "mannequin-paint"], "");
     // A folder where a picture is to be: found out when the revision is in the transaction already.
     fs::create_dir_all(at.join("report/residual-map.png/x")).unwrap();
-    let message = refused(matdb(at).args(diagnose("scene.toml", "drift", &["--add"])));
+    let message = refused(matdb(at).args(diagnose("scene.toml", "drift", &["--add", "-q"])));
     assert!(message.contains("residual-map.png"), "{message}");
-    assert_eq!(entries(&at.join("report")), ["residual-map.png"]);
+    // The answer is not lost with the picture.
+    assert!(message.contains("the answer is in report/report.json"), "{message}");
+    assert_eq!(entries(&at.join("report")), ["report.json", "residual-map.png", "residuals.csv"]);
     assert_eq!(contents(&at.join("matdb.sqlite")).len(), 1);
     assert!(!at.join("scene-after.toml").exists());
+}
+
+#[test]
+fn a_database_in_use_does_not_lose_the_answer() {
+    let folder = measured(DRIFT, None);
+    let at = folder.path();
+    run(at, &["add", "mannequin-paint"], "");
+    let other = rusqlite::Connection::open(at.join("matdb.sqlite")).unwrap();
+    other.execute_batch("BEGIN IMMEDIATE").unwrap();
+    let message = refused(matdb(at).args(diagnose("scene.toml", "drift", &["--add", "-q"])));
+    assert!(message.contains("in use by another program"), "{message}");
+    assert!(
+        message.contains("nothing was stored, and the answer is in report/report.json"),
+        "{message}"
+    );
+    let report = fs::read_to_string(at.join("report/report.json")).unwrap();
+    assert!(report.contains("\"verdict\": \"explained\""), "{report}");
+    assert!(at.join("report/report.html").exists() && !at.join("scene-after.toml").exists());
+    other.execute_batch("COMMIT").unwrap();
+    assert_eq!(contents(&at.join("matdb.sqlite")).len(), 1);
 }

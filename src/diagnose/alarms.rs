@@ -9,13 +9,17 @@
 //! | `first` | (1 − G(T)ⁿ)·g(y)/(1 − G(T)): every cell above T is as likely to be the first |
 //! | `all` | n·g(y)/G(T), beside G(T)ⁿ of every chirp: the cells above T are independent |
 //!
+//! A false alarm near the target is not told from an echo beside its edge. A chirp that misses and has one there is left out, and
+//! what the others report is divided by the probability G(T)ⁿ + a·(1 − G(T)ⁿ) of having none, a the share of the gate away from
+//! the target.
+//!
 //! Where no gate is declared, n is the most likely one, so that only the powers of false alarms
 //! tell N: a cloud without any may have been cleaned, and its silence is no evidence.
 
 use serde::Serialize;
 
 use super::observation::{DB, ReceiverLimits};
-use crate::effects::Receiver;
+use crate::effects::{Receiver, Shot};
 use crate::fit::gamma_law::GammaLaw;
 use crate::radar::Returns;
 
@@ -49,6 +53,10 @@ pub struct Alarms {
     /// Number of false alarms of chirps that meet the target, where only the first detection is reported: an echo ends
     /// the search, so that they do not tell the noise.
     pub of_target: usize,
+    /// Chirps that miss the target and report one, and its range, m.
+    pub of_misses: Vec<(Shot, f64)>,
+    /// Number of chirps that miss the target and stay silent.
+    pub silent_misses: usize,
     /// Powers of echoes that noise stayed below, W, where a chirp reports its strongest detection: a false alarm that is
     /// stronger would stand in place of the echo.
     pub stronger_w: Vec<f64>,
@@ -94,15 +102,17 @@ impl Alarms {
             return 0.0;
         }
         let cell = self.cell(receiver, limits);
-        let cells = self.cells(&cell, limits.threshold_w);
+        let Gate { cells, away } = self.gate(&cell, limits.threshold_w);
         if cells <= 0.0 {
             return 0.0;
         }
         let ln_silent = cell.ln_below(limits.threshold_w);
-        let mut sum = cells * self.silent as f64 * ln_silent + cells * self.ln_stronger(&cell);
+        let mut sum = cells * (self.silent as f64 * ln_silent + away * self.ln_stronger(&cell));
+        let misses = (self.silent_misses + self.of_misses.len()) as f64;
+        sum -= misses * kept(away, cells * ln_silent).ln();
         for power_w in &self.powers_w {
             let beside_density = match self.returns {
-                Returns::Strongest => cells.ln() + (cells - 1.0) * cell.ln_below(*power_w),
+                Returns::Strongest => (away * cells).ln() + (cells - 1.0) * cell.ln_below(*power_w),
                 Returns::First => ln_complement(cells * ln_silent) - ln_complement(ln_silent),
                 Returns::All => cells.ln() - ln_silent,
             };
@@ -122,12 +132,13 @@ impl Alarms {
         let counted = self.powers_w.len();
         let cell = self.cell(receiver, limits);
         let ln_silent = cell.ln_below(limits.threshold_w);
-        let cells = self.cells(&cell, limits.threshold_w);
+        let Gate { cells, away } = self.gate(&cell, limits.threshold_w);
         let expected = match self.returns {
             Returns::All => -cells * self.silent as f64 * ln_silent.exp_m1(),
             _ => {
                 let over = self.stronger_w.iter().map(|y| (cells * cell.ln_below(*y)).exp_m1());
-                -((self.silent + counted) as f64) * (cells * ln_silent).exp_m1() - over.sum::<f64>()
+                let silent = (self.silent + counted) as f64 / kept(away, cells * ln_silent);
+                -away * (silent * (cells * ln_silent).exp_m1() + over.sum::<f64>())
             }
         };
         FalseAlarms { counted, expected: self.cells.map(|_| expected.max(0.0)) }
@@ -136,12 +147,6 @@ impl Alarms {
     /// Number of false alarms, also of those that tell no noise.
     pub(super) fn count(&self) -> usize {
         self.powers_w.len() + self.of_target
-    }
-
-    /// How many of some detections near the target are more than chance has.
-    pub(super) fn beyond_chance(&self, near_target: usize) -> usize {
-        let expected = self.near_target + 3.0 * self.near_target.sqrt();
-        near_target.saturating_sub(expected.round() as usize)
     }
 
     /// Change of the data of these chirps by another level of noise, dB; none where they hardly tell it.
@@ -162,13 +167,23 @@ impl Alarms {
         Cell { law: GammaLaw::new(self.looks), ln_noise }
     }
 
-    /// The number of cells that count: the likeliest, or those of a declared gate less its part near the target, where false
-    /// alarms count as strays.
-    fn cells(&self, cell: &Cell, threshold_w: f64) -> f64 {
-        let count = self.powers_w.len() as f64;
-        if let Some(cells) = self.cells {
-            return if count > 0.0 { cells * count / (count + self.near_target) } else { cells };
+    /// The gate: as declared, or of the likeliest number of cells, none of them near the target.
+    fn gate(&self, cell: &Cell, threshold_w: f64) -> Gate {
+        let Some(cells) = self.cells else {
+            return Gate { cells: self.likely_cells(cell, threshold_w), away: 1.0 };
+        };
+        let of_misses = self.of_misses.len() as f64;
+        let away = if of_misses > 0.0 { of_misses / (of_misses + self.near_target) } else { 1.0 };
+        match self.returns {
+            Returns::Strongest => Gate { cells, away },
+            // Each cell for itself.
+            Returns::First | Returns::All => Gate { cells: away * cells, away: 1.0 },
         }
+    }
+
+    /// The likeliest number of cells.
+    fn likely_cells(&self, cell: &Cell, threshold_w: f64) -> f64 {
+        let count = self.powers_w.len() as f64;
         let ln_below = cell.ln_below(threshold_w).min(-f64::MIN_POSITIVE);
         let silent = self.silent as f64;
         let cells = match self.returns {
@@ -192,7 +207,7 @@ impl Alarms {
         }
         let threshold_w = limits.threshold_w;
         let cell = self.cell(receiver, limits);
-        let cells = self.cells(&cell, threshold_w);
+        let Gate { cells, .. } = self.gate(&cell, threshold_w);
         let mut sorted = self.powers_w.clone();
         sorted.sort_by(f64::total_cmp);
         // Of the strongest of all cells, or of one of them.
@@ -232,6 +247,22 @@ impl Alarms {
     }
 }
 
+/// How many of some detections are more than chance has where it is expected to have so many.
+pub(super) fn beyond_chance(count: usize, expected: f64) -> usize {
+    count.saturating_sub((expected + 3.0 * expected.sqrt()).round() as usize)
+}
+
+/// Range cells of a gate, and the share of them away from the target.
+struct Gate {
+    cells: f64,
+    away: f64,
+}
+
+/// Probability that a chirp which misses has no false alarm near the target, where no cell reports one with e^ln_silent.
+fn kept(away: f64, ln_silent: f64) -> f64 {
+    1.0 + (1.0 - away) * ln_silent.exp_m1()
+}
+
 /// ln(1 − eˣ), x < 0.
 fn ln_complement(x: f64) -> f64 {
     (-x.exp_m1()).max(f64::MIN_POSITIVE).ln()
@@ -259,6 +290,7 @@ impl Cell {
 mod tests {
     use super::*;
     use crate::radar::random::{Key, Purpose};
+    use crate::radar::{Chirps, Radar};
 
     const LIMITS: ReceiverLimits = ReceiverLimits { threshold_w: 1e-9, range_sd_m: 0.0 };
 
@@ -310,6 +342,33 @@ mod tests {
             assert!(off.abs() < 4.0, "{returns:?}: {counted} {expected}");
             assert_eq!(alarms.counted(&receiver(noise_w), LIMITS).expected, None);
         }
+    }
+
+    /// Chirps that miss the target, of whose false alarms a quarter lies near it and is left out. Many chirps have one.
+    #[test]
+    fn false_alarms_near_the_target_do_not_count() {
+        let noise_w = 4.6e-10;
+        let mut alarms = drawn(noise_w, 5, Returns::Strongest);
+        assert!(alarms.powers_w.len() > alarms.silent / 2, "{}", alarms.powers_w.len());
+        (alarms.cells, alarms.silent_misses) = (Some(40.0), alarms.silent);
+        let mut number = 0;
+        alarms.powers_w.retain(|_| {
+            number += 1;
+            number % 4 != 0
+        });
+        alarms.near_target = (number - alarms.powers_w.len()) as f64;
+        let chirps = Chirps::draw(&Radar::default(), |_| Err("no file".to_owned())).unwrap();
+        let shot = Shot::missed(&chirps, 0, 0.0);
+        alarms.of_misses = vec![(shot, 8.0); alarms.powers_w.len()];
+        let ln_p = |step: &i32| {
+            let noise_w = noise_w * 10f64.powf(f64::from(*step) / 1000.0);
+            alarms.ln_p(&receiver(noise_w), LIMITS)
+        };
+        let best = (-50..=50).max_by(|a, b| ln_p(a).total_cmp(&ln_p(b))).unwrap();
+        assert!(best.abs() <= 6, "{best} hundredths of a dB");
+        let FalseAlarms { counted, expected } = alarms.counted(&receiver(noise_w), LIMITS);
+        let off = (counted as f64 - expected.unwrap()) / expected.unwrap().sqrt();
+        assert!(off.abs() < 3.0, "{counted} {expected:?}");
     }
 
     /// Chirps on a target whose echoes are about as strong as the noise, of which the stronger is reported.

@@ -107,7 +107,7 @@ fn found(
     for (number, ((known, &value), sd)) in
         effect.parameters().iter().zip(values).zip(sd).enumerate()
     {
-        let sd = finite((sd * known.step).hypot(effect.form_error(number) * value));
+        let sd = finite((sd * known.step).hypot(effect.form_error(number, value)));
         numbers.insert(known.name, Value { value, sd, unit: known.unit });
     }
     FoundEffect {

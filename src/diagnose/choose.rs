@@ -225,13 +225,19 @@ fn add_best<'a>(search: &Search, model: &mut Explanation<'a>, trials: &mut [Tria
             class.push(other);
         }
     }
-    let rivals = contenders
+    // Beside other effects, a more flexible member of its family or another effect may prove better.
+    let own = trials[best].candidate.numbers;
+    let is_more_flexible = |one: &&Contender| {
+        let Candidate { numbers, .. } = trials[one.trial].candidate;
+        trials[one.trial].candidate.is_same(&chosen) && numbers > own
+    };
+    let others = contenders
         .iter()
         .filter(|one| !trials[one.trial].candidate.is_same(&chosen))
         .filter(|one| one.gain >= SHARE_OF_RIVAL * first.gain)
-        .take(MOST_RIVALS)
-        .map(|one| trials[one.trial].effect)
-        .collect();
+        .take(MOST_RIVALS);
+    let rivals = contenders.iter().filter(is_more_flexible).take(1).chain(others);
+    let rivals = rivals.map(|one| trials[one.trial].effect).collect();
     let candidate = &mut trials[best].candidate;
     candidate.accepted = true;
     model.added.push(Addition { class, evidence: Evidence::from(&*candidate), rivals });

@@ -1,5 +1,5 @@
-//! Effects against rivals that did nearly as well when they were chosen: effects added later may have made the
-//! difference clear.
+//! Effects against rivals that did nearly as well when they were chosen, and against a more flexible member of their own
+//! family: effects added later may have made the difference clear.
 
 use super::clouds;
 use super::evidence::{Evidence, Largest};
@@ -25,7 +25,8 @@ pub(super) fn exchange<'a>(search: &Search, model: &mut Explanation<'a>) {
         let mut one = model.added.remove(0);
         (model.state.space, model.state.fit.at) = model.state.space.rotated(&model.state.fit.at);
         let mut rivals = std::mem::take(&mut one.rivals);
-        rivals.retain(|rival| !model.state.space.has(rival.name(), rival.scans()));
+        let (others, _) = model.state.space.without(&model.state.fit.at, model.added.len());
+        rivals.retain(|rival| !others.has(rival.name(), rival.scans()));
         if !rivals.is_empty() {
             let without = search.scorer.without(&model.state, model.added.len());
             let largest = model.largest();
@@ -76,7 +77,8 @@ fn contest<'a>(
         last.evidence = Evidence::from(&candidate);
         *state = with_rival;
     }
-    if is_tied {
+    let is_other = state.space.effects.last().is_some_and(|effect| effect.name() != loser);
+    if is_tied && is_other {
         last.class.push(loser);
     } else if is_better {
         last.class.clear();

@@ -32,9 +32,11 @@ struct Removal<'a> {
 }
 
 impl<'a> Explanation<'a> {
-    /// The largest of the effects.
+    /// The largest of the effects whose form may be another one than theirs.
     pub fn largest(&self) -> Largest {
-        Largest::of(self.added.iter().map(|one| &one.evidence))
+        let effects = self.added.iter().zip(&self.state.space.effects);
+        let of_some_form = effects.filter(|(_, effect)| !effect.about().has_one_form);
+        Largest::of(of_some_form.map(|(one, _)| &one.evidence))
     }
 
     /// Removes effects that later ones made superfluous.

@@ -36,9 +36,8 @@ impl Stray {
     /// radar's own beam.
     pub(super) fn is_beside_edge(&self, model: &Model, stage: &Stage) -> bool {
         let beam = BeamSpot { diameter_m: stage.geometry.radar.spot_fwhm_m() };
-        let mut model = model.clone();
-        model.effects.push((&beam, Vec::new()));
-        self.shot.is_some_and(|shot| shot.misses()) && self.is_on_target(&model, stage)
+        self.shot.is_some_and(|shot| shot.misses())
+            && self.is_on_target(&with_own_beam(model, &beam), stage)
     }
 
     /// Whether the detection lies on the target where the effects of a model place it.
@@ -267,7 +266,6 @@ impl Scan<'_> {
         let (mut past_the_edge, mut chirps_with_points) = (HashSet::new(), HashSet::new());
         let mut spoke = HashSet::new();
         let mut alarms = Alarms { weight: 1.0, returns: self.returns, ..Alarms::default() };
-        let mut alarm_ranges_m = Vec::new();
         for (point, chirp) in self.in_order(cloud, by_number, |chirp| {
             shot_of_chirp.get(&chirp).and_then(|index| shots.get(*index))
         }) {
@@ -318,31 +316,25 @@ impl Scan<'_> {
                         second += usize::from(!is_first);
                     } else if self.is_alarm(point, &shot, &mut spoke) {
                         alarms.powers_w.push(point.power_w);
-                        alarm_ranges_m.push(shot.ray.origin.distance_m(point.point));
+                        alarms.of_misses.push((shot, range_m));
                         continue;
                     }
                 }
                 strays.push(Stray { shot, range_m });
             }
         }
+        let rays = self.chirps.rays.iter().zip(&self.chirps.number);
+        let (missing, numbers): (Vec<&Ray<Global>>, Vec<&u32>) =
+            rays.filter(|(_, number)| !shot_of_chirp.contains_key(*number)).unzip();
+        let spoke_not = numbers.into_iter().filter(|number| !chirps_with_points.contains(*number));
+        alarms.silent_misses = spoke_not.count();
         alarms.silent = match self.returns {
             // Chirps without any detection.
             Returns::Strongest => self.chirps.rays.len().saturating_sub(chirps_with_points.len()),
-            Returns::First => (self.chirps.number.iter())
-                .filter(|number| !shot_of_chirp.contains_key(*number))
-                .filter(|number| !chirps_with_points.contains(*number))
-                .count(),
+            Returns::First => alarms.silent_misses,
             Returns::All => self.chirps.rays.len(),
         };
-        let missing: Vec<&Ray<Global>> = self
-            .chirps
-            .rays
-            .iter()
-            .zip(&self.chirps.number)
-            .filter(|(_, number)| !shot_of_chirp.contains_key(*number))
-            .map(|(ray, _)| ray)
-            .collect();
-        alarms.near_target = expected_near(&missing, &alarm_ranges_m, target.as_ref());
+        alarms.near_target = expected_near(&missing, &alarms.of_misses, target.as_ref());
         let cloud_match = CloudMatch { observations, strays, alarms };
         Assignment { cloud_match, on_target, second }
     }
@@ -378,23 +370,52 @@ fn is_past_an_edge(point: &CloudPoint, shot: &Shot, target: Option<&Nearest>) ->
 
 /// How many false alarms lie near the target by chance, where others at these ranges, m, do not: noise reports any range
 /// alike.
-fn expected_near(missing: &[&Ray<Global>], ranges_m: &[f64], target: Option<&Nearest>) -> f64 {
-    /// Ranges of the gate that are tried on each ray, and false alarms that tell where it lies.
-    const RANGES: u32 = 16;
-    const LEAST: usize = 10;
-    let Some(target) = target.filter(|_| ranges_m.len() >= LEAST) else { return 0.0 };
-    let nearest_m = ranges_m.iter().copied().fold(f64::INFINITY, f64::min);
-    let farthest_m = ranges_m.iter().copied().fold(0.0, f64::max);
-    let step_m = (farthest_m - nearest_m) / f64::from(RANGES);
+fn expected_near(
+    missing: &[&Ray<Global>],
+    alarms: &[(Shot, f64)],
+    target: Option<&Nearest>,
+) -> f64 {
+    let Some((target, ranges_m)) = target.zip(ranges_of_gate(alarms)) else { return 0.0 };
     let near = missing.par_iter().map(|ray| {
-        let places = (0..RANGES).map(|step| {
-            let range_m = nearest_m + (f64::from(step) + 0.5) * step_m;
-            ray.origin.xyz + range_m * ray.direction.xyz()
-        });
+        let places = ranges_m.iter().map(|range_m| ray.origin.xyz + *range_m * ray.direction.xyz());
         places.filter(|place| target.find(*place).1 <= GATE_M).count()
     });
-    let near = near.sum::<usize>() as f64 / (f64::from(RANGES) * missing.len().max(1) as f64);
-    ranges_m.len() as f64 * near / (1.0 - near).max(1e-3)
+    let near = near.sum::<usize>() as f64 / (RANGES * missing.len().max(1)) as f64;
+    alarms.len() as f64 * near / (1.0 - near).max(1e-3)
+}
+
+/// How many false alarms lie beside an edge by chance, where others do not.
+pub(super) fn expected_beside_edge(alarms: &[(Shot, f64)], model: &Model, stage: &Stage) -> f64 {
+    let Some(ranges_m) = ranges_of_gate(alarms) else { return 0.0 };
+    let beam = BeamSpot { diameter_m: stage.geometry.radar.spot_fwhm_m() };
+    let model = with_own_beam(model, &beam);
+    let chances = alarms.par_iter().map(|(shot, _)| {
+        let edges_m = model.ranges_m(stage, shot);
+        let is_near = |m: &&f64| edges_m.iter().any(|edge_m| (edge_m - **m).abs() <= GATE_M);
+        let near = ranges_m.iter().filter(is_near).count() as f64 / RANGES as f64;
+        near / (1.0 - near).max(1e-3)
+    });
+    chances.sum()
+}
+
+/// Ranges of a gate that are tried on each ray.
+const RANGES: usize = 16;
+
+/// Ranges, m, evenly over where false alarms lie; none for too few of them.
+fn ranges_of_gate(alarms: &[(Shot, f64)]) -> Option<[f64; RANGES]> {
+    const LEAST: usize = 10;
+    let ranges_m = alarms.iter().map(|(_, range_m)| *range_m);
+    let nearest_m = ranges_m.clone().fold(f64::INFINITY, f64::min);
+    let step_m = (ranges_m.fold(0.0, f64::max) - nearest_m) / RANGES as f64;
+    let all_m = std::array::from_fn(|step| nearest_m + (step as f64 + 0.5) * step_m);
+    (alarms.len() >= LEAST).then_some(all_m)
+}
+
+/// A model whose chirps see all that the radar's own beam reaches.
+fn with_own_beam<'a>(model: &Model<'a>, beam: &'a BeamSpot) -> Model<'a> {
+    let mut model = model.clone();
+    model.effects.push((beam, Vec::new()));
+    model
 }
 
 /// The shortest way from a ray to a point, m.

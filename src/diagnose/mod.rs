@@ -14,7 +14,7 @@
 //! | every chirp against the target, the cloud against the chirps | `shots.rs`, `matching.rs` |
 //! | probability of the observations | `likelihood.rs`, `problem.rs`, `shared.rs` |
 //! | several clouds of one target | `views.rs`, `in_scans.rs`, `clouds.rs`, `contradiction.rs` |
-//! | scattering models and effects together | `space.rs`, `refit.rs`, `ranges.rs` |
+//! | scattering models and effects together | `space.rs`, `refit.rs`, `optima.rs`, `ranges.rs` |
 //! | the promise of an effect | `screen.rs` |
 //! | the score of a model on held-out patches | `folds.rs`, `score.rs`, `scorer.rs` |
 //! | the choice: trials, support, rivals, removal | `trial.rs`, `support.rs`, `choose.rs`, `exchange.rs`, `explanation.rs` |
@@ -42,6 +42,7 @@ mod level;
 mod likelihood;
 mod matching;
 mod observation;
+mod optima;
 mod order;
 mod placebo;
 mod problem;

@@ -29,6 +29,7 @@ const ABOUT: About = About {
     signature: "The gain of as many free parameters by chance.",
     parameters: &WAVES,
     conflicts: &[],
+    has_one_form: false,
 };
 
 impl Placebo {

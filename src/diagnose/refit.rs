@@ -201,25 +201,36 @@ impl Problem<'_> {
             (0..at.len()).filter(|&i| at[i] > lower[i] && at[i] < upper[i]).collect();
         let of_free =
             |whole: DMatrix<f64>| (whole + &beside).select_rows(&free).select_columns(&free);
-        let of_shots = of_free(products(&terms, &slopes));
         let of_cells = of_free(products_of_cells(&slopes, folds));
+        let of_shots = of_free(products(&terms, [&slopes, &slopes]));
         let of_model = deviations(&of_shots);
+        let mut is_told = vec![true; free.len()];
+        if !space.moving().is_empty() {
+            // Facets that move under the rays change ln p by steps, which slopes over another width do not share. They would
+            // tell how a ball is turned.
+            let wide = self.slopes_over(WIDE_TO_NARROW[0], space, at, [&lower, &upper], &terms);
+            let both = of_free(products(&terms, [&slopes, &wide]));
+            let of_both = deviations(&(0.5 * (&both + both.transpose())));
+            is_told = of_both.iter().zip(&of_model).map(is_told_by_both).collect();
+        }
         let inverse = of_shots.try_inverse().map(|inverse| &inverse * of_cells * &inverse);
         let mut sd = vec![f64::INFINITY; at.len()];
         for (place, (&i, of_model)) in free.iter().zip(of_model).enumerate() {
             let over_cells =
                 inverse.as_ref().map_or(0.0, |all| all[(place, place)].max(0.0).sqrt());
-            sd[i] = of_model.map_or(f64::INFINITY, |sd| sd.max(over_cells));
+            if let Some(of_model) = of_model.filter(|_| is_told[place]) {
+                sd[i] = of_model.max(over_cells);
+            }
         }
         sd
     }
 }
 
-/// Sum of the products of the shots' scores. Powers that share speckle count for less, ranges do not. Without it both
+/// Sum of the products of the shots' scores, by slopes of one or of two widths. Powers that share speckle count for less, ranges do not. Without it both
 /// are one score.
-fn products(terms: &[Term], slopes: &[Vec<Slope>]) -> DMatrix<f64> {
-    DMatrix::from_fn(slopes.len(), slopes.len(), |i, j| {
-        let pairs = terms.iter().zip(slopes[i].iter().zip(&slopes[j]));
+fn products(terms: &[Term], [one, other]: [&[Vec<Slope>]; 2]) -> DMatrix<f64> {
+    DMatrix::from_fn(one.len(), one.len(), |i, j| {
+        let pairs = terms.iter().zip(one[i].iter().zip(&other[j]));
         let products = pairs.map(|(term, (a, b))| {
             if term.weight == 1.0 {
                 return a.ln_p * b.ln_p;
@@ -229,6 +240,12 @@ fn products(terms: &[Term], slopes: &[Vec<Slope>]) -> DMatrix<f64> {
         });
         products.sum()
     })
+}
+
+/// Whether what slopes over two widths share tells an unknown nearly as well as those of one seem to.
+fn is_told_by_both((both, one): (&Option<f64>, &Option<f64>)) -> bool {
+    const WIDER: f64 = 3.0;
+    both.zip(*one).is_some_and(|(both, one)| both < WIDER * one)
 }
 
 /// Sum of the products of the cells' scores.

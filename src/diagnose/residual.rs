@@ -7,7 +7,6 @@
 
 use std::collections::HashMap;
 use std::f64::consts::SQRT_2;
-use std::ops::Range;
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -83,54 +82,76 @@ pub(super) fn speckle_sd_db(looks: f64) -> f64 {
 /// The residual that neighbouring shots share, though their noise is independent: the root mean square of a
 /// structure too fine for any field, dB, and its probability by chance.
 ///
-/// Neighbours are one to two spots apart, or as much farther as they share speckle.
+/// Neighbours are up to six spots farther apart than `from_m`, up to which they may share speckle. In the first spot what they share
+/// is positive. Farther on it may be negative: waves a few spots long share nothing over their whole length, and speckle shares
+/// nothing in any part of it.
 pub(super) fn of_neighbours(
     z: &[f64],
     shots: &[Shot],
-    apart_m: Range<f64>,
+    [from_m, spot_m]: [f64; 2],
     sd_db: f64,
     folds: &Folds,
 ) -> ResidualStructure {
+    let farthest_m = from_m + RINGS as f64 * spot_m;
     let mut members: HashMap<[i64; 2], Vec<usize>> = HashMap::new();
     for (index, shot) in shots.iter().enumerate() {
-        members.entry(square(shot, apart_m.end)).or_default().push(index);
+        members.entry(square(shot, farthest_m)).or_default().push(index);
     }
-    let products: Vec<f64> = shots
-        .par_iter()
-        .zip(z)
-        .map(|(shot, z_here)| match sum_over_neighbours(shot, z, shots, &apart_m, &members) {
-            Some((sum, count)) => z_here * sum / count,
-            None => 0.0,
-        })
-        .collect();
-    let [sum, se] = folds.sum(&products);
-    let covariance = sum / shots.len().max(1) as f64;
-    let strength_db = sd_db * covariance.max(0.0).sqrt();
-    let p_value = 0.5 * erfc(sum / se.max(f64::MIN_POSITIVE) / SQRT_2);
-    ResidualStructure { covariate: "neighbourhood".to_owned(), strength_db, p_value }
-}
-
-/// Sum and number of the residuals in a ring about a shot; `None` where there are none.
-fn sum_over_neighbours(
-    shot: &Shot,
-    z: &[f64],
-    shots: &[Shot],
-    ring_m: &Range<f64>,
-    members: &HashMap<[i64; 2], Vec<usize>>,
-) -> Option<(f64, f64)> {
-    let [i, j] = square(shot, ring_m.end);
-    let (mut sum, mut count) = (0.0, 0.0);
-    for (di, dj) in (-1..=1).flat_map(|di| (-1..=1).map(move |dj| (di, dj))) {
-        for &index in members.get(&[i + di, j + dj]).into_iter().flatten() {
-            let (Some(other), Some(z)) = (shots.get(index), z.get(index)) else { continue };
-            let apart_m = (other.xt_m - shot.xt_m).hypot(other.yt_m - shot.yt_m);
-            if ring_m.contains(&apart_m) && other.scan == shot.scan {
-                sum += z;
-                count += 1.0;
-            }
+    let neighbours = Neighbours { z, shots, members, from_m, spot_m };
+    let products: Vec<[f64; RINGS]> =
+        (0..shots.len()).into_par_iter().map(|index| neighbours.products(index)).collect();
+    let mut found =
+        ResidualStructure { covariate: "neighbourhood".to_owned(), strength_db: 0.0, p_value: 1.0 };
+    for ring in 0..RINGS {
+        let of_ring: Vec<f64> = products.iter().map(|rings| rings[ring]).collect();
+        let [sum, se] = folds.sum(&of_ring);
+        let [sum, sides] = if ring == 0 { [sum, 1.0] } else { [sum.abs(), 2.0] };
+        let chance = 0.5 * sides * erfc(sum / se.max(f64::MIN_POSITIVE) / SQRT_2);
+        let p_value = (RINGS as f64 * chance).min(1.0);
+        if p_value < found.p_value {
+            let covariance = sum.max(0.0) / shots.len().max(1) as f64;
+            found.p_value = p_value;
+            found.strength_db = sd_db * covariance.sqrt();
         }
     }
-    (count > 0.0).then_some((sum, count))
+    found
+}
+
+/// Rings, each a spot wide, in which neighbours are compared.
+const RINGS: usize = 6;
+
+/// Residuals of shots in squares as wide as the farthest ring.
+struct Neighbours<'a> {
+    z: &'a [f64],
+    shots: &'a [Shot],
+    members: HashMap<[i64; 2], Vec<usize>>,
+    from_m: f64,
+    spot_m: f64,
+}
+
+impl Neighbours<'_> {
+    /// Residual of a shot times the mean residual in each ring about it. A pair counts once, so that products are
+    /// independent where residuals are, and twice as much.
+    fn products(&self, index: usize) -> [f64; RINGS] {
+        let shot = &self.shots[index];
+        let [i, j] = square(shot, self.from_m + RINGS as f64 * self.spot_m);
+        let (mut sums, mut counts) = ([0.0; RINGS], [0.0; RINGS]);
+        for (di, dj) in (-1..=1).flat_map(|di| (-1..=1).map(move |dj| (di, dj))) {
+            for &other in self.members.get(&[i + di, j + dj]).into_iter().flatten() {
+                let Shot { xt_m, yt_m, scan, .. } = self.shots[other];
+                let beyond_m = (xt_m - shot.xt_m).hypot(yt_m - shot.yt_m) - self.from_m;
+                let ring = (beyond_m / self.spot_m).floor();
+                if ring >= 0.0 && ring < RINGS as f64 && scan == shot.scan {
+                    let ring = ring as usize;
+                    counts[ring] += 1.0;
+                    if other > index {
+                        sums[ring] += self.z[other];
+                    }
+                }
+            }
+        }
+        std::array::from_fn(|ring| 2.0 * self.z[index] * sums[ring] / f64::max(counts[ring], 1.0))
+    }
 }
 
 /// Number of shots beyond [`OUTLYING`] standard deviations in power.

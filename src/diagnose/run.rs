@@ -1,6 +1,6 @@
 //! The steps of a diagnosis.
 
-use super::alarms::FalseAlarms;
+use super::alarms::{FalseAlarms, beyond_chance};
 use super::answer::{self, Column};
 use super::choose::{Choice, choose_effects};
 use super::contradiction::contradictions;
@@ -9,7 +9,8 @@ use super::error::DiagnoseError;
 use super::evidence::Candidate;
 use super::folds::Folds;
 use super::in_scans::{InScans, for_scans};
-use super::matching::MOST_STRAYS;
+use super::matching::{MOST_STRAYS, expected_beside_edge};
+use super::optima;
 use super::problem::{ENOUGH, Problem, Sample, caches};
 use super::remains::{Remainder, find_unexplained};
 use super::report::{Controls, Report, SCHEMA, Verdict};
@@ -104,18 +105,19 @@ impl Diagnosis {
         let controls = controls(&search, base, &simplest, numbers_of_controls(&choice.ranking));
 
         notify("testing the remainder");
-        Ok(report(subject, &scorer, &choice, strays, controls))
+        Ok(report(subject, &search, &choice, strays, controls))
     }
 }
 
 /// Tests what the final model leaves unexplained, and reports everything.
 fn report(
     subject: &Subject,
-    scorer: &Scorer,
+    search: &Search,
     choice: &Choice,
     strays: StrayCounts,
     controls: Controls,
 ) -> Report {
+    let scorer = &search.scorer;
     let Choice { base, model, ranking, structure, hidden, .. } = choice;
     let State { space, fit, held_out } = &model.state;
     let prediction = &scorer.predict(&model.state);
@@ -134,7 +136,9 @@ fn report(
     let unknown = structure.map(|structure| prediction.as_passed(&structure.ln_factor));
     let columns = [Column { state: base, z: &z_before }, Column { state: &model.state, z: &z }];
     let unknown = &unknown.unwrap_or_default();
-    let sd = scorer.problem.sd(space, &fit.at, scorer.folds);
+    let about_optimum = scorer.problem.sd(space, &fit.at, scorer.folds);
+    let over_optima = optima::spread(&scorer.problem, search.sample, space, fit);
+    let sd: Vec<f64> = about_optimum.iter().zip(over_optima).map(|(a, b)| a.hypot(b)).collect();
     let contradictions = contradictions(scorer, choice);
     let verdict = if contradictions.is_empty() {
         Verdict::new(!model.added.is_empty(), !unexplained.is_empty())
@@ -214,17 +218,19 @@ impl StrayCounts {
         let mut counts = StrayCounts { beside_edge: 0, past_the_spot: 0, off_target: 0 };
         for (scan, (strays, alarms)) in subject.strays.iter().zip(subject.alarms).enumerate() {
             let model = state.space.model(scorer.problem.receiver, &state.fit.at, scan as u16);
-            let (stage, mut off_target) = (&subject.stages[scan], 0);
+            let (stage, mut off_target, mut past_the_spot) = (&subject.stages[scan], 0, 0);
             for stray in strays {
                 let is_missed = usize::from(!stray.is_on_target(&model, stage));
                 if stray.is_beside_edge(&model, stage) {
                     counts.beside_edge += 1;
-                    counts.past_the_spot += is_missed;
+                    past_the_spot += is_missed;
                 } else {
                     off_target += is_missed;
                 }
             }
-            counts.off_target += alarms.beyond_chance(off_target);
+            let by_chance = expected_beside_edge(&alarms.of_misses, &model, stage);
+            counts.past_the_spot += beyond_chance(past_the_spot, by_chance);
+            counts.off_target += beyond_chance(off_target, alarms.near_target);
         }
         let points = subject.strays.iter().map(Vec::len).sum::<usize>() + subject.detected();
         if counts.off_target as f64 > MOST_STRAYS * points as f64 {

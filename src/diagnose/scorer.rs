@@ -6,6 +6,7 @@ use nalgebra::DVector;
 use super::covariates::covariates;
 use super::field::{Field, Model, Structure, scaled, terms};
 use super::folds::Folds;
+use super::optima;
 use super::order;
 use super::problem::{Problem, Sample};
 use super::refit::{Fit, SCOUT, SEARCH};
@@ -23,9 +24,6 @@ pub(super) const SHARE_OF_FORM: f64 = 0.25;
 const FIELD_ERRORS: f64 = 3.0;
 /// Probability by chance below which the correlation of neighbours counts.
 const CHANCE: f64 = 1e-3;
-/// Shots on which shapes of laws all over their ranges are tried, and how many of them each law is searched from.
-const FEW: usize = 800;
-const LAW_STARTS: usize = 2;
 /// Difference in ln likelihood within which two fits have found the same optimum.
 const SAME_OPTIMUM: f64 = 0.5;
 /// Most looks in the first fit of the base, which starts far from the data, and in the test whether the data are
@@ -73,12 +71,13 @@ impl Scorer<'_> {
         let receiver = with_wide_speckle(self.problem.receiver);
         let wide = Problem { receiver, ..sample.problem(&self.problem) };
         let near = wide.fit(&space, &space.start(), &[], &SEARCH).at;
-        let few = Sample::new(&wide, FEW);
-        let elsewhere = few.problem(&wide).law_starts(&space, &near, LAW_STARTS);
+        let elsewhere = optima::elsewhere(&wide, &space, &near);
         let found = elsewhere.iter().map(|start| wide.fit(&space, start, &[], &SEARCH).at);
         // The scene's own scattering models may fit better, as to a cloud without speckle that it rendered.
         let starts = found.chain([near, space.start()]);
-        let fits = starts.map(|start| (self.problem.ln_likelihood(&space, &start), start));
+        // Lobes in each other's place may predict as well.
+        let worth = |at: &DVector<f64>| self.problem.ln_likelihood(&space, at) - space.against(at);
+        let fits = starts.map(|start| (worth(&start), start));
         let best = fits.max_by(|a, b| a.0.total_cmp(&b.0));
         let start = best.map_or(space.start(), |(_, start)| start);
         let fit = self.problem.fit(&space, &start, &[], &SEARCH);
@@ -90,7 +89,8 @@ impl Scorer<'_> {
     pub fn better_base<'a>(&self, base: &State<'a>, with: &State<'a>) -> Option<State<'a>> {
         let laws = with.fit.at.rows(0, with.space.base_len()).into_owned();
         let fit = self.problem.fit(&base.space, &laws, &[], &SEARCH);
-        let is_better = fit.ln_likelihood > base.fit.ln_likelihood + SAME_OPTIMUM;
+        let worth = |fit: &Fit| fit.ln_likelihood - base.space.against(&fit.at);
+        let is_better = worth(&fit) > worth(&base.fit) + SAME_OPTIMUM;
         is_better.then(|| self.state(base.space.clone(), fit))
     }
 
@@ -218,8 +218,7 @@ impl Scorer<'_> {
         let sd_db = speckle_sd_db(prediction.receiver.looks);
         let spot_m = self.spot_m();
         let from_m = spot_m.max(self.problem.shared.reach_m);
-        let apart_m = from_m..from_m + spot_m;
-        residual::of_neighbours(z, self.problem.shots, apart_m, sd_db, self.folds)
+        residual::of_neighbours(z, self.problem.shots, [from_m, spot_m], sd_db, self.folds)
     }
 
     /// The swing of residuals with the chirp number.

@@ -92,6 +92,7 @@ impl Gain {
             signature: "",
             parameters: &[EDGE],
             conflicts: &[],
+            has_one_form: false,
         };
         Gain { about, db }
     }

@@ -13,6 +13,7 @@ use super::screen::Screen;
 use super::size::Size;
 use super::space::Space;
 use crate::effects::{Effect, EffectParameter};
+use crate::fit::minimise::Minimise;
 
 /// Starts of an effect that are followed.
 const STARTS: usize = 2;
@@ -30,6 +31,9 @@ const STRENGTHS: [f64; 6] = [0.3, 1.0, 3.0, 7.0, 12.0, 20.0];
 const SHARE_OF_START: f64 = 0.7;
 /// A start that gains less than this share of its promise is moved by its gain instead.
 const SHARE_OF_WORD: f64 = 0.3;
+/// Starts that the rest of a model is fitted to, and that search.
+const FOLLOWED_BY_LAWS: usize = 4;
+const FOLLOW: Minimise = Minimise { iterations: 4, tolerance: 0.5, patience: 2 };
 /// An effect that promises less than this share of the best is not fitted.
 const SHARE_TO_SCOUT: f64 = 0.05;
 /// Most parameters of an effect that is fitted whatever it promises, where a start is far from the fitted model.
@@ -51,7 +55,7 @@ pub(super) struct Trial<'a> {
     pub effect: &'a dyn Effect,
     pub space: Space<'a>,
     starts: Vec<Start>,
-    /// Whether one of them is with the scattering models as declared, of which no promise tells anything.
+    /// Whether one of them is followed whatever it promises.
     has_far_start: bool,
     /// Number of starts before the choice of the best.
     pub tried: usize,
@@ -218,15 +222,25 @@ impl<'p> Search<'p> {
         // A start at which the effect is absent promises nothing; it is tried all the same.
         let is_absent = values.len() == 1 && starts.iter().all(|start| start.worth == 0.0);
         // Without an effect that bends the whole curve, such as a ceiling, the scattering models may be far from those
-        // that fit best with it.
+        // that fit best with it. Beside other effects they are near, but one on the scatter may gain only where they
+        // follow it.
         let is_first = state.space.effects.is_empty() && !is_absent;
+        let most = starts.first().map_or(0.0, |start| start.worth);
+        let least = self.scorer.settings.least_gain_of(effect.parameters().len(), values.len());
         let mut has_far_start = false;
-        if (is_first || screen.leaves_laws_open)
-            && let Some(at) = from_declared_laws(screen, state, &space, effect, &values)
-        {
+        let far = if is_first || screen.leaves_laws_open {
+            let declared = state.space.restarted(&state.fit.at);
+            likeliest_start(screen, &declared, &space, effect, &values)
+                .and_then(|best| likeliest_strength(screen, &best, &space, effect))
+        } else if most < least && !is_absent {
+            likeliest_beside_laws(screen, &state.fit.at, &space, effect, &values)
+        } else {
+            None
+        };
+        if let Some(at) = far {
             // Followed whatever it promises: a promise is about a step from the fitted scattering models.
             has_far_start = true;
-            starts.push(Start { worth: starts.first().map_or(0.0, |start| start.worth), at });
+            starts.push(Start { worth: most, at });
         }
         let Start { worth, at } = starts.first()?.clone();
         let gain = if is_absent { f64::INFINITY } else { worth };
@@ -402,20 +416,56 @@ fn is_at_rest(fit: &Fit, effect: &dyn Effect) -> bool {
     fit.is_stuck && !effect.moves()
 }
 
-/// The best start of any strength with the scattering models as the scene declares them.
-fn from_declared_laws(
+/// The likeliest start beside a point of the model so far.
+fn likeliest_start(
     screen: &Screen,
-    state: &State,
+    at: &DVector<f64>,
     space: &Space,
     effect: &dyn Effect,
     values: &[Vec<f64>],
 ) -> Option<DVector<f64>> {
-    let declared = state.space.restarted(&state.fit.at);
-    let starts = values.iter().map(|values| Space::joined(&declared, effect, values));
+    let starts = values.iter().map(|values| Space::joined(at, effect, values));
+    likeliest(screen, space, starts)
+}
+
+/// The likeliest start where the model so far follows it: an error of the angle fits none whose lobes are as wide already as
+/// both together.
+fn likeliest_beside_laws(
+    screen: &Screen,
+    at: &DVector<f64>,
+    space: &Space,
+    effect: &dyn Effect,
+    values: &[Vec<f64>],
+) -> Option<DVector<f64>> {
+    let held: Vec<usize> = (at.len()..at.len() + effect.parameters().len()).collect();
+    let mut starts: Vec<(f64, DVector<f64>)> = values
+        .iter()
+        .map(|values| Space::joined(at, effect, values))
+        .map(|start| (screen.gain(space, &start), start))
+        .collect();
+    starts.sort_by(|a, b| b.0.total_cmp(&a.0));
+    starts.truncate(FOLLOWED_BY_LAWS);
+    let fits = starts.iter().map(|(_, start)| screen.problem.fit(space, start, &held, &FOLLOW));
+    fits.max_by(|a, b| a.ln_likelihood.total_cmp(&b.ln_likelihood)).map(|fit| fit.at)
+}
+
+/// The likeliest strength of a start.
+fn likeliest_strength(
+    screen: &Screen,
+    start: &DVector<f64>,
+    space: &Space,
+    effect: &dyn Effect,
+) -> Option<DVector<f64>> {
+    likeliest(screen, space, of_all_strengths(effect, start).into_iter())
+}
+
+fn likeliest(
+    screen: &Screen,
+    space: &Space,
+    starts: impl Iterator<Item = DVector<f64>>,
+) -> Option<DVector<f64>> {
     let gains = starts.map(|start| (screen.gain(space, &start), start));
-    let (_, best) = gains.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let stronger = of_all_strengths(effect, &best).map(|at| (screen.gain(space, &at), at));
-    stronger.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, at)| at)
+    gains.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, at)| at)
 }
 
 /// A start with its effect in each of [`STRENGTHS`].

@@ -171,8 +171,8 @@ pub trait Effect: Sync {
     /// Changes the mean powers and ranges of all shots by a shaded survey. It is called after all gains.
     fn arrive(&self, _values: &[f64], _shaded: &Survey, _echoes: &mut [Option<MeanEcho>]) {}
 
-    /// How far a parameter may be off because the real effect has another form than this one, as a share of its value.
-    fn form_error(&self, _parameter: usize) -> f64 {
+    /// How far a parameter of this value may be off because the real effect has another form than this one.
+    fn form_error(&self, _parameter: usize, _value: f64) -> f64 {
         0.0
     }
 
@@ -200,6 +200,9 @@ pub struct About {
     pub parameters: &'static [EffectParameter],
     /// Settings of a scene that exclude it.
     pub conflicts: &'static [Conflict],
+    /// Whether it has no other form than this one, as a shift and turn of a rigid target has none. What stands beside any
+    /// other effect may only correct that effect's form, and must be large itself.
+    pub has_one_form: bool,
 }
 
 impl About {

@@ -227,9 +227,8 @@ impl Model<'_> {
             let power_w: Vec<f64> = powers.collect();
             let of_shots = power_w.chunks_exact(NODES).zip(arrived);
             let tilts = of_shots.map(|(power_w, arrived)| {
-                let Some(untilted_w) = arrived.map(|echo| echo.power_w) else {
-                    return Tilts::default();
-                };
+                // A ray that misses the target where an effect has moved it has no power, whatever the tilt.
+                let untilted_w = arrived.map_or(0.0, |echo| echo.power_w);
                 std::array::from_fn(|node| {
                     let factor = if untilted_w > 0.0 { power_w[node] / untilted_w } else { 0.0 };
                     (factor, nodes[node].1)

@@ -104,20 +104,10 @@ fn publish(
     let publication = Publication::new(checked, report, notices, [program(db), command]);
     let earlier = Earlier::in_folder(request.folder, &request.inputs());
     let contradiction = publication.report().contradiction();
-    let published = if request.add && contradiction.is_none() {
-        let mut store = db.write()?;
-        let (published, written) = publication.store(&mut store, |files, beside| {
-            let mut folders = vec![(request.folder, files)];
-            folders.extend(beside.iter().map(|(folder, files)| (*folder, &files[..])));
-            Placement::new(&folders).map_err(|error| beside.iter().fold(error, of_scene).into())
-        })?;
-        written.keep();
-        published
-    } else {
-        let files = publication.files()?;
-        write_all(request.folder, &files)?;
-        PublicationResult { files, ..PublicationResult::default() }
-    };
+    let is_stored = request.add && contradiction.is_none();
+    let published =
+        if is_stored { store(&publication, request, db) } else { write(&publication, request) };
+    let published = published.map_err(|error| keep_answer(&publication, request, error))?;
     for notice in earlier.remove_all_but(&published.files) {
         console.notice(&notice);
     }
@@ -126,7 +116,7 @@ fn publish(
     }
     let names: Vec<String> = published.files.iter().map(|(name, _)| name.clone()).collect();
     let mut text = publication.report().text(&names, request.folder);
-    if request.add && contradiction.is_none() {
+    if is_stored {
         text += &stored(&publication, &published, request, db.path());
     }
     console.result(&text, &publication.report().record())?;
@@ -134,6 +124,39 @@ fn publish(
         Some(sentence) => Err(DiagnoseError::Contradiction { sentence }.into()),
         None => Ok(()),
     }
+}
+
+/// Writes the report of a diagnosis.
+fn write(publication: &Publication, request: &CloudRequest) -> Result<PublicationResult, Error> {
+    let files = publication.files()?;
+    write_all(request.folder, &files)?;
+    Ok(PublicationResult { files, ..PublicationResult::default() })
+}
+
+/// Writes the report of a diagnosis, and stores what was found.
+fn store(
+    publication: &Publication,
+    request: &CloudRequest,
+    db: &Database,
+) -> Result<PublicationResult, Error> {
+    let mut store = db.write()?;
+    let (published, written) = publication.store(&mut store, |files, beside| {
+        let mut folders = vec![(request.folder, files)];
+        folders.extend(beside.iter().map(|(folder, files)| (*folder, &files[..])));
+        Placement::new(&folders).map_err(|error| beside.iter().fold(error, of_scene).into())
+    })?;
+    written.keep();
+    Ok(published)
+}
+
+/// Writes as much of an answer as can be written that could not be stored or drawn.
+fn keep_answer(publication: &Publication, request: &CloudRequest, error: Error) -> Error {
+    let is_kept = |files: Vec<(String, Vec<u8>)>| write_all(request.folder, &files).is_ok();
+    if publication.files().is_ok_and(is_kept) || publication.report().tables().is_ok_and(is_kept) {
+        let report = request.folder.join("report.json");
+        return Error::Unstored { error: Box::new(error), report };
+    }
+    error
 }
 
 /// The error of a file; one next to the scene is not in the folder that a person can choose.

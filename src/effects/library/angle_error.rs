@@ -20,6 +20,7 @@ const ABOUT: About = About {
          scatter alike at every angle.",
     parameters: &[EffectParameter::new("sd_deg", "deg", [0.0, 20.0], 0.0, 1.0)],
     conflicts: &[Conflict::OF_BACKSCATTER],
+    has_one_form: false,
 };
 
 impl Effect for AngleError {
@@ -31,8 +32,8 @@ impl Effect for AngleError {
         vec![vec![0.4], vec![1.0], vec![3.0]]
     }
 
-    fn form_error(&self, _parameter: usize) -> f64 {
-        FORM_ERROR
+    fn form_error(&self, _parameter: usize, value: f64) -> f64 {
+        FORM_ERROR * value
     }
 
     fn receive(&self, values: &[f64], receiver: Receiver) -> Receiver {

@@ -36,6 +36,7 @@ const ABOUT: About = About {
         EffectParameter::new("turn_deg", "deg", [-90.0, 90.0], 0.0, 10.0),
     ],
     conflicts: &[Conflict::OF_BACKSCATTER],
+    has_one_form: false,
 };
 
 impl Effect for Anisotropy {

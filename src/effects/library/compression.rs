@@ -18,6 +18,9 @@ pub(crate) struct Compression;
 /// A saturation that no echo reaches, dBm.
 const NONE_DBM: f64 = 60.0;
 
+/// What the best knee and saturation leave of another ceiling, such as a hyperbolic tangent, dB.
+const FORM_ERROR_DB: f64 = 0.2;
+
 const ABOUT: About = About {
     name: "compression",
     level: Level::Instrument,
@@ -32,6 +35,7 @@ const ABOUT: About = About {
         EffectParameter::new("averaged", "1", [0.0, 1.0], 1.0, 0.2),
     ],
     conflicts: &[],
+    has_one_form: false,
 };
 
 impl Effect for Compression {
@@ -49,6 +53,10 @@ impl Effect for Compression {
             }
         }
         starts
+    }
+
+    fn form_error(&self, parameter: usize, _value: f64) -> f64 {
+        if parameter == 0 { FORM_ERROR_DB } else { 0.0 }
     }
 
     fn receive(&self, values: &[f64], receiver: Receiver) -> Receiver {

@@ -17,6 +17,7 @@ const ABOUT: About = About {
          factor that grows with angle, and needs no rough lobe.",
     parameters: &[EffectParameter::new("share", "1", [0.0, 1.0], 0.0, 0.25)],
     conflicts: &[Conflict::OF_BACKSCATTER],
+    has_one_form: false,
 };
 
 impl Effect for CorrelatedShadowing {

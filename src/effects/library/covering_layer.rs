@@ -62,6 +62,7 @@ const ABOUT: About = About {
          drift change without an edge. A layer over everything cannot be told from the calibration.",
     parameters: &PARAMETERS,
     conflicts: &[Conflict::OF_BACKSCATTER],
+    has_one_form: false,
 };
 
 impl Effect for CoveringLayer {

@@ -59,6 +59,7 @@ const ABOUT: About = About {
          stay right, which motion does not leave.",
     parameters: &PARAMETERS,
     conflicts: &[],
+    has_one_form: false,
 };
 
 impl Effect for Drift {

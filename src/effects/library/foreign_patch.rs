@@ -98,6 +98,7 @@ const ABOUT: About = About {
          brighten places too, but concave ones, and with longer ranges.",
     parameters: &PARAMETERS,
     conflicts: &[],
+    has_one_form: false,
 };
 
 impl Effect for ForeignPatch {

@@ -34,6 +34,7 @@ const ABOUT: About = About {
          tells them apart.",
     parameters: &PARAMETERS,
     conflicts: &[],
+    has_one_form: false,
 };
 
 impl Effect for FovGain {

@@ -108,6 +108,7 @@ const ABOUT: About = About {
          drift of the gain leaves the ranges as they are.",
     parameters: &PARAMETERS,
     conflicts: &[Conflict::OF_MOTION, Conflict::OF_SHEETS],
+    has_one_form: true,
 };
 
 impl Effect for Motion {

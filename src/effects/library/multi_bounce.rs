@@ -246,6 +246,7 @@ const ABOUT: About = About {
         Conflict::OF_SHEETS,
         Conflict::OF_BACKSCATTER,
     ],
+    has_one_form: false,
 };
 
 impl Effect for MultiBounce {

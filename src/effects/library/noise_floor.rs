@@ -24,6 +24,7 @@ const ABOUT: About = About {
         problem: "adds thermal noise, and [radar.receiver] makes all of its own",
         way_out: "raise radar.receiver.noise_figure_db instead",
     }],
+    has_one_form: true,
 };
 
 impl Effect for NoiseFloor {

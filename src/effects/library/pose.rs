@@ -40,6 +40,7 @@ const ABOUT: About = About {
          hits where none should be. Motion does the same, but changes along the scan.",
     parameters: &PARAMETERS,
     conflicts: &[Conflict::OF_MOTION, Conflict::OF_SHEETS],
+    has_one_form: true,
 };
 
 impl Effect for Pose {

@@ -23,6 +23,7 @@ const ABOUT: About = About {
         problem: "sets the looks of speckle, and [radar.receiver] averages whole beat signals",
         way_out: "set radar.speckle.looks instead",
     }],
+    has_one_form: true,
 };
 
 impl Effect for Speckle {

@@ -27,6 +27,7 @@ const ABOUT: About = About {
         EffectParameter::new("cosine_power", "1", [0.0, 4.0], 0.0, 0.5),
     ],
     conflicts: &[Conflict::OF_BACKSCATTER],
+    has_one_form: false,
 };
 
 impl Effect for Subsurface {

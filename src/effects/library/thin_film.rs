@@ -62,6 +62,7 @@ const ABOUT: About = About {
         EffectParameter::new("substrate_ratio", "1", [0.5, 5.0], 1.0, 0.1),
     ],
     conflicts: &[Conflict::OF_BACKSCATTER],
+    has_one_form: false,
 };
 
 impl Effect for ThinFilm {

@@ -48,15 +48,23 @@ impl<'a> CloudReport<'a> {
         CloudReport { answer, pictures, peaks, notices }
     }
 
-    /// `report.json`, `residuals.csv`, and two files for every picture.
+    /// `report.json` and `residuals.csv`.
+    ///
+    /// # Errors
+    /// A number that JSON does not have.
+    pub fn tables(&self) -> Result<Vec<(String, Vec<u8>)>, Error> {
+        Ok(vec![
+            ("report.json".to_owned(), json_file(&self.record())?),
+            ("residuals.csv".to_owned(), residuals::of_cloud(&self.answer.report.rows)),
+        ])
+    }
+
+    /// [`CloudReport::tables`], and two files for every picture.
     ///
     /// # Errors
     /// A picture that is too large to be drawn.
     pub fn tables_and_pictures(&self) -> Result<Vec<(String, Vec<u8>)>, Error> {
-        let mut files = vec![
-            ("report.json".to_owned(), json_file(&self.record())?),
-            ("residuals.csv".to_owned(), residuals::of_cloud(&self.answer.report.rows)),
-        ];
+        let mut files = self.tables()?;
         for picture in &self.pictures {
             files.extend(picture.files()?);
         }
