@@ -51,9 +51,11 @@ def correlation_series(height, length, theta):
 
 def kirchhoff(height, length, lobe, theta):
     """Coherent lobe and incoherent series, Gaussian correlation; (S, 1) columns give (S, n)."""
-    pairs, where = np.unique(np.hstack(np.broadcast_arrays(height, length)), axis=0, return_inverse=True)
+    pairs, where = np.hstack(np.broadcast_arrays(height, length)), np.zeros(1, int)
+    if len(pairs) > 1:  # a grid has few heights and lengths
+        pairs, where = np.unique(pairs, axis=0, return_inverse=True)
     series = np.empty((len(pairs), theta.size))
-    for h in np.unique(pairs[:, 0]):
+    for h in dict.fromkeys(pairs[:, 0]):
         rows = np.flatnonzero(pairs[:, 0] == h)
         series[rows] = correlation_series(max(h, 1e-12), pairs[rows, 1], theta.ravel())
     x = (2 * WAVE_NUMBER * height * np.cos(theta)) ** 2

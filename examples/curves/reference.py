@@ -32,10 +32,20 @@ def read(path):
 
 def log_cdf(looks, y):
     """ln of the regularised lower incomplete gamma function, also where it underflows."""
-    value = gammainc(looks, y)
+    looks, y = np.broadcast_arrays(looks, y)
+    out = np.zeros(y.shape)
+    # Above this it is 1 to 1e-15, and below y = 1e-4 the start of its series is good to 1e-8: scipy takes long for both.
+    some = y < looks + 40 + 12 * np.sqrt(looks)
+    middle = some & (y >= 1e-4)
+    value = gammainc(looks[middle], y[middle])
+    kept = value > 1e-280
+    middle[middle] = kept
+    out[middle] = np.log(value[kept])
+    rest = some & ~middle
+    a, z = looks[rest], y[rest]
     with np.errstate(divide="ignore", invalid="ignore"):
-        near = looks * np.log(y) - y - gammaln(looks + 1) - np.log1p(-np.minimum(y / (looks + 1), 0.999))
-        return np.where(value > 1e-280, np.log(value), near)
+        out[rest] = a * np.log(z) - z - gammaln(a + 1) - np.log1p(-np.minimum(z / (a + 1), 0.999))
+    return out
 
 
 def log_p(curve, s, looks):
@@ -125,8 +135,23 @@ def peaks(value, side, dimensions, count):
     return np.concatenate([hills[: count - 3], rest])[:count]
 
 
-def refine(model, curve, start):
-    """Nelder-Mead and then L-BFGS-B over the ln of shapes, levels and looks."""
+COARSE, FINE = {"xatol": 1e-3, "fatol": 1e-3}, {"xatol": 1e-5, "fatol": 1e-6}
+NEAR = 3.0  # ln p below the best up to which a rough end is searched to the end
+
+
+def refine(model, curve, starts):
+    """The best end of searches from all starts: Nelder-Mead over the ln of shapes, levels and looks, roughly for
+    all, then finely and by L-BFGS-B for those that came near the best."""
+    rough = [descend(model, curve, start, [COARSE], polish=False) for start in starts]
+    least = min(cost for cost, _ in rough)
+    cost, v = min(descend(model, curve, v, [FINE], polish=True) for cost, v in rough if cost <= least + NEAR)
+    k, v = len(model.shape), np.array(v)
+    shape = [float(c[0, 0]) for c in model.columns(v[None, :k])]
+    return -cost, shape, [float(x) for x in np.exp(v[k:-1])], float(np.exp(v[-1]))
+
+
+def descend(model, curve, start, rounds, polish):
+    """(cost, place) where a search from a start ends; the place as a list."""
     k = len(model.shape)
     bounds = model.bounds() + [(np.log(LEAST_LEVEL), 0.0)] * len(model.levels) + [tuple(np.log(LOOKS))]
     low, high = np.array(bounds).T
@@ -138,18 +163,17 @@ def refine(model, curve, start):
         return -log_p(curve, s[None, :], np.exp(v[-1:])[None, :])[0]
 
     v = np.clip(start, low, high)
-    for options in ({"xatol": 1e-3, "fatol": 1e-3}, {"xatol": 1e-5, "fatol": 1e-6}):
+    for options in rounds:
         inside = np.where(v > (low + high) / 2, -0.15, 0.15)
         simplex = np.vstack([v, v + np.diag(inside)])
         found = minimize(cost, v, method="Nelder-Mead", bounds=bounds,
                          options={"maxiter": 250 * len(v), "initial_simplex": simplex, **options})
         v = found.x
-    polished = minimize(cost, v, method="L-BFGS-B", bounds=bounds)
-    if polished.fun < found.fun:
-        found, v = polished, polished.x
-    v = np.clip(v, low, high)
-    shape = [float(c[0, 0]) for c in model.columns(v[None, :k])]
-    return -float(found.fun), shape, [float(x) for x in np.exp(v[k:-1])], float(np.exp(v[-1]))
+    if polish:
+        polished = minimize(cost, v, method="L-BFGS-B", bounds=bounds)
+        if polished.fun < found.fun:
+            found, v = polished, polished.x
+    return float(found.fun), np.clip(v, low, high).tolist()
 
 
 def at(model, curve, shape, levels, looks):
@@ -182,4 +206,4 @@ def best(model, curve, truth=None):
         shape, levels, true_looks = truth
         u = [np.log(v + s[3]) for v, s in zip(shape, model.shape)]
         starts.append(np.concatenate([u, np.log(np.maximum(levels, LEAST_LEVEL)), [np.log(true_looks)]]))
-    return max((refine(model, curve, s) for s in starts), key=lambda r: r[0])
+    return refine(model, curve, starts)

@@ -27,21 +27,59 @@ def run_matdb(program, path, model, extra):
     return done.returncode, said, done.stderr.strip(), seconds
 
 
-def judge(program, folder, group, number, extra):
+def hashed(*parts):
+    return hashlib.sha256(b"\0".join(parts)).hexdigest()[:12]
+
+
+def content(path):
+    with open(path, "rb") as file:
+        return file.read()
+
+
+class Store:
+    """Results in a file, one a line, each under a key; a run that was stopped goes on where it was."""
+
+    def __init__(self, path):
+        self.path, self.kept = path, {}
+        if os.path.exists(path):
+            with open(path) as file:
+                self.kept = {r["key"]: r for r in map(json.loads, file)}
+
+    def get(self, key, make):
+        if key not in self.kept:
+            self.kept[key] = {"key": key, **make()}
+            with open(self.path, "a") as file:
+                file.write(json.dumps(self.kept[key]) + "\n")
+        return self.kept[key]
+
+
+def truth_of(folder, group, number):
     with open(f"{folder}/truth/{group}-{number}.json") as file:
-        truth = json.load(file)
+        return json.load(file)
+
+
+def refer(folder, group, number):
+    """The reference's best fit of a curve: its numbers, and the seconds that it took."""
+    truth = truth_of(folder, group, number)
+    start = None
+    if truth["law"] == truth["fitted"]:
+        start = list(truth["shape"].values()), list(truth["levels"].values()), truth["looks"]
+    clock = time.process_time()
+    curve = reference.read(f"{folder}/{group}/{number}.csv")
+    value, shape, levels, looks = reference.best(MODELS[truth["fitted"]], curve, start)
+    seconds = time.process_time() - clock
+    return {"ln_p": value, "shape": shape, "levels": levels, "looks": looks, "seconds": seconds}
+
+
+def judge(program, folder, group, number, extra, known):
+    """What matdb makes of a curve, against `known`, the reference's fit."""
+    truth = truth_of(folder, group, number)
     model = MODELS[truth["fitted"]]
     path = f"{folder}/{group}/{number}.csv"
     status, said, error, seconds = run_matdb(program, path, model.name, extra)
     out = {"group": group, "file": path, "model": model.name, "truth": truth, "seconds": seconds, "status": status}
     curve = reference.read(path)
-    start = None
-    if truth["law"] == truth["fitted"]:
-        start = list(truth["shape"].values()), list(truth["levels"].values()), truth["looks"]
-    clock = time.process_time()
-    value, shape, levels, looks = reference.best(model, curve, start)
-    out["reference"] = {"ln_p": value, "shape": shape, "levels": levels, "looks": looks}
-    out["reference_seconds"] = time.process_time() - clock
+    out["reference"] = known
     if said is None:
         return {**out, "kind": "refused", "error": error}
     shape, levels = model.read({e["name"]: e["value"] for e in said["estimates"]})
@@ -119,25 +157,35 @@ def main():
     parser.add_argument("--again", action="store_true", help="forget the stored results")
     parser.add_argument("--minutes", type=float, default=1e9, help="start no curve after this time")
     parser.add_argument("--strict", action="store_true", help="exit with 1 unless every curve is good")
+    parser.add_argument("--only-reference", action="store_true", help="search the references alone; runs keep them")
     parser.add_argument("--only-table", action="store_true", help="print what is stored")
     parser.add_argument("--extra", nargs=argparse.REMAINDER, default=[], help="further options of matdb fit")
     a = parser.parse_args()
-    # Of one program and its options: results of another would be mixed in.
-    with open(shutil.which(a.matdb) or a.matdb, "rb") as file:
-        key = hashlib.sha256(file.read() + " ".join(a.extra).encode()).hexdigest()[:12]
-    store = f"{a.folder}/results-{key}.jsonl"
+    # Results of another program, of other options, of another reference or of another curve are never mixed in.
+    here = os.path.dirname(os.path.abspath(__file__))
+    judges = hashed(content(f"{here}/reference.py"), content(f"{here}/laws.py"))
+    references = Store(f"{a.folder}/references-{judges}.jsonl")
+    key = ""
+    if not a.only_reference:
+        key = hashed(content(shutil.which(a.matdb) or a.matdb), *[option.encode() for option in a.extra])
+    store = f"{a.folder}/results-{key}-{judges}.jsonl"
     if a.again and os.path.exists(store):
         os.remove(store)
-    results = [json.loads(line) for line in open(store)] if os.path.exists(store) else []
-    known = {r["file"] for r in results}
+    answers = Store(store)
+    results = list(answers.kept.values())
     end = time.time() + 60 * a.minutes
     for group in [] if a.only_table else a.models or [*MODELS, "scan"]:
         for name in sorted(os.listdir(f"{a.folder}/{group}"))[: a.count]:
-            if f"{a.folder}/{group}/{name}" in known or time.time() > end:
+            number = name[:-4]
+            curve = hashed(content(f"{a.folder}/{group}/{name}"), group.encode())
+            if time.time() > end or curve in answers.kept:
                 continue
-            results.append(judge(a.matdb, a.folder, group, name[:-4], a.extra))
-            with open(store, "a") as file:
-                file.write(json.dumps(results[-1]) + "\n")
+            known = references.get(curve, lambda: refer(a.folder, group, number))
+            if not a.only_reference:
+                make = lambda: judge(a.matdb, a.folder, group, number, a.extra, known)
+                results.append(answers.get(curve, make))
+    if a.only_reference:
+        return
     table(results)
     misses(results)
     if a.strict and (not results or any(r["kind"] != "good" for r in results)):
