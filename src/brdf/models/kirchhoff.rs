@@ -222,28 +222,64 @@ impl ScatteringModel for Kirchhoff {
 }
 
 /// Terms below this share of the largest are left out.
-const LEAST_TERM_LN: f64 = -40.0;
+const LEAST_TERM: f64 = 4e-18;
 
 impl Correlation {
     /// e^{−g} Σ gⁿ/n! · W_n/l², `across` being q_t·l and `beam` (q_z·δ·l/2)².
     ///
-    /// The terms rise to one maximum and fall from there. They are taken as logarithms, relative to
-    /// the largest, so that neither gⁿ nor n! nor e^{−g} can overflow or vanish on the way.
+    /// The terms rise to one maximum and fall from there. They are taken relative to the largest, whose
+    /// logarithm is known, so that neither gⁿ nor n! nor e^{−g} can overflow or vanish on the way.
     fn series(self, g: f64, across: f64, beam: f64) -> f64 {
         if g <= 0.0 {
             return 0.0;
         }
         // ln of the term n of the series.
+        let ln_g = g.ln();
         let term_ln = |n: u32| {
             let n_real = f64::from(n);
-            n_real * g.ln() - g - ln_factorial(n) + self.spectrum_ln(n_real, across, beam)
+            n_real * ln_g - g - ln_factorial(n) + self.spectrum_ln(n_real, across, beam)
         };
         let peak = first_fall(|n| term_ln(n + 1) <= term_ln(n));
-        let peak_ln = term_ln(peak);
-        // Each side of the peak up to the first term that is too small to count.
-        let up = shares((peak..u32::MAX).map(|n| term_ln(n) - peak_ln));
-        let down = shares((1..peak).rev().map(|n| term_ln(n) - peak_ln));
-        peak_ln.exp() * (up + down)
+        let largest = term_ln(peak).exp();
+        if largest == 0.0 {
+            return 0.0;
+        }
+        // Each side of the peak up to the first term that is too small to count; gⁿ/n! follows from its neighbour's.
+        let peak_real = f64::from(peak);
+        let spectrum = self.spectrum_over(self.spectrum_ln(peak_real, across, beam), across, beam);
+        let (mut sum, mut weight, mut n) = (1.0, 1.0, peak_real);
+        loop {
+            n += 1.0;
+            weight *= g / n;
+            let share = weight * spectrum(n);
+            if !(share > LEAST_TERM) {
+                break;
+            }
+            sum += share;
+        }
+        (weight, n) = (1.0, peak_real);
+        while n > 1.0 {
+            weight *= n / g;
+            n -= 1.0;
+            let share = weight * spectrum(n);
+            if !(share > LEAST_TERM) {
+                break;
+            }
+            sum += share;
+        }
+        largest * sum
+    }
+
+    /// W_n over the one whose W_n/l² has this logarithm.
+    fn spectrum_over(self, over_ln: f64, across: f64, beam: f64) -> impl Fn(f64) -> f64 {
+        let across2 = across * across;
+        move |n| match self {
+            Correlation::Gaussian => {
+                let width = n + beam;
+                PI / width * (-across2 / (4.0 * width) - over_ln).exp()
+            }
+            Correlation::Exponential => (self.spectrum_ln(n, across, beam) - over_ln).exp(),
+        }
     }
 
     /// ln(W_n/l²).
@@ -267,11 +303,6 @@ fn seen_exponential(n: f64, across2: f64, beam: f64) -> f64 {
         (PI / t).sqrt() / width * (-across2 / (4.0 * width)).exp()
     };
     over_exponential(gaussian)
-}
-
-/// Sum of shares given as logarithms, up to the first that is too small to count.
-fn shares(shares_ln: impl Iterator<Item = f64>) -> f64 {
-    shares_ln.take_while(|share_ln| *share_ln > LEAST_TERM_LN).map(f64::exp).sum()
 }
 
 /// The first n ≥ 1 from which `falls` holds, for a condition that stays true once it is.
