@@ -8,7 +8,7 @@
 use nalgebra::DVector;
 
 use super::error::FitError;
-use super::table::Table;
+use super::table::{Angles, Table};
 use crate::brdf::{Brdf, Mixture, Parameter};
 
 /// Name of the specular level S = (1 − k)·f_λ.
@@ -132,6 +132,16 @@ impl Coordinate {
         }
     }
 
+    /// Ends of the range, in the search, over which a level that grows with the number grows all the way: of a
+    /// permittivity those from 1 up. Below it a mirror reflects less with a larger one, or all.
+    pub fn rising_ends(&self) -> [f64; 2] {
+        let [lower, upper] = self.ends();
+        match self.scale {
+            Scale::Asinh if upper > self.searched(1.0) => [lower.max(self.searched(1.0)), upper],
+            _ => [lower, upper],
+        }
+    }
+
     /// Largest distance of a drawn start from the given one.
     pub fn spread(&self) -> f64 {
         let [lower, upper] = self.ends();
@@ -152,6 +162,8 @@ pub(crate) struct Coordinates {
     /// k of the mixture whose levels are searched as products.
     gauge: Option<f64>,
     looks: f64,
+    /// Numbers that change a law only as another one does, each with that one: a search holds them.
+    pub redundant: Vec<[usize; 2]>,
     /// Divergence of the beam that sees the model, rad.
     beam_rad: f64,
     /// Whether levels that no law can have, S + R > 1, are lowered together.
@@ -202,6 +214,7 @@ impl Coordinates {
             base,
             gauge,
             looks: looks.unwrap_or(1.0),
+            redundant: Vec::new(),
             beam_rad: 0.0,
             lowers_levels: false,
         })
@@ -237,9 +250,18 @@ impl Coordinates {
         self.vector(|c| c.ends()[1])
     }
 
-    /// Both ends of the ranges, with the looks held where they are.
-    pub fn holding_looks(&self, at: &DVector<f64>) -> [DVector<f64>; 2] {
+    /// Both ends of the ranges, with redundant numbers held where they are.
+    pub fn bounds(&self, at: &DVector<f64>) -> [DVector<f64>; 2] {
         let (mut lower, mut upper) = (self.lower(), self.upper());
+        for &[index, _] in &self.redundant {
+            (lower[index], upper[index]) = (at[index], at[index]);
+        }
+        [lower, upper]
+    }
+
+    /// The same, with the looks held as well.
+    pub fn holding_looks(&self, at: &DVector<f64>) -> [DVector<f64>; 2] {
+        let [mut lower, mut upper] = self.bounds(at);
         for index in (0..at.len()).filter(|&i| self.list.get(i).is_some_and(|c| c.name == LOOKS)) {
             (lower[index], upper[index]) = (at[index], at[index]);
         }
@@ -284,8 +306,8 @@ impl Coordinates {
     }
 
     /// ln σ⁰ of the model at a point of the search, as the beam sees it.
-    pub(super) fn table(&self, at: &DVector<f64>) -> Table {
-        Table::new(&self.model(at), self.beam_rad)
+    pub(super) fn table(&self, at: &DVector<f64>, angles: &Angles) -> Table {
+        Table::new(&self.model(at), self.beam_rad, angles)
     }
 
     /// The chosen k, where backscatter does not determine it; `None` for a model without such a gauge.

@@ -79,7 +79,8 @@ pub(crate) struct GammaLaw {
     constant_slope: f64,
     /// √L, at least 1: how much narrower than that of one look the law is in ln power.
     narrowness: f64,
-    below: Arc<[LnProbability]>,
+    /// Its tabulated tail; none where each limit is computed by itself.
+    below: Option<Arc<[LnProbability]>>,
 }
 
 /// The tails of the latest laws by the bits of their looks: a search asks for the same ones over and over.
@@ -96,15 +97,26 @@ const KNOTS: usize = 608;
 const LOOKS_STEP: f64 = 1e-4;
 
 impl GammaLaw {
+    /// The law of L looks, L > 0, for this number of limits: a table of the tail costs as much as hundreds of them.
+    pub fn for_limits(looks: f64, limits: usize) -> GammaLaw {
+        GammaLaw::with_tail(looks, |narrowness| {
+            (limits > KNOTS / 2).then(|| tail(looks, narrowness))
+        })
+    }
+
     /// The law of L looks, L > 0.
     pub fn new(looks: f64) -> GammaLaw {
+        GammaLaw::with_tail(looks, |narrowness| Some(tail(looks, narrowness)))
+    }
+
+    fn with_tail(looks: f64, tail: impl FnOnce(f64) -> Option<Arc<[LnProbability]>>) -> GammaLaw {
         let narrowness = looks.sqrt().max(1.0);
         GammaLaw {
             looks,
             narrowness,
             ln_constant: looks * looks.ln() - ln_gamma(looks),
             constant_slope: looks * (looks.ln() + 1.0 - digamma(looks)),
-            below: tail(looks, narrowness),
+            below: tail(narrowness),
         }
     }
 
@@ -124,13 +136,14 @@ impl GammaLaw {
     pub fn below(&self, ln_limit: f64, ln_mean: f64) -> LnProbability {
         let ln_ratio = ln_limit - ln_mean;
         let x = (ln_ratio * self.narrowness - FIRST) / STEP;
-        if !(1.0..(KNOTS - 3) as f64).contains(&x) {
+        let inside = (1.0..(KNOTS - 3) as f64).contains(&x);
+        let Some(tail) = self.below.as_ref().filter(|_| inside) else {
             return below(self.looks, ln_ratio.clamp(-700.0, 700.0));
-        }
+        };
         let cell = x as usize;
         let (weights, _) = lagrange(x - cell as f64);
         let mut sum = LnProbability::default();
-        for (knot, weight) in self.below.iter().skip(cell - 1).zip(weights) {
+        for (knot, weight) in tail.iter().skip(cell - 1).zip(weights) {
             sum.value += weight * knot.value;
             sum.by_ln_mean += weight * knot.by_ln_mean;
             sum.by_ln_looks += weight * knot.by_ln_looks;

@@ -10,7 +10,7 @@ use statrs::function::erf::{erfc, erfc_inv};
 use super::coordinates::Coordinates;
 use super::likelihood::Likelihood;
 use super::settings::{Fit, Method};
-use super::table::Place;
+use super::table::{Angles, Place};
 use crate::material::{Goodness, Observation};
 use crate::radar::random::{Key, Purpose};
 use crate::radar::speckle::standard_deviation_db;
@@ -23,7 +23,7 @@ pub(super) fn residuals_db(
     at: &DVector<f64>,
     rows: &[Observation],
 ) -> Vec<f64> {
-    let table = coordinates.table(at);
+    let table = coordinates.table(at, Angles::knots());
     let noise_w = fit.noise_w.unwrap_or(0.0);
     let detected = rows.iter().filter(|row| !row.is_censored());
     detected

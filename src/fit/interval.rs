@@ -75,7 +75,7 @@ impl<F: Fn(&DVector<f64>) -> Local> Profile<'_, F> {
         let covariance = &self.uncertainty.covariance;
         let follow = covariance.column(index) / covariance[(index, index)];
         let start = &self.best.at + follow * offset;
-        let (mut lower, mut upper) = (self.coordinates.lower(), self.coordinates.upper());
+        let [mut lower, mut upper] = self.coordinates.bounds(&start);
         lower[index] = self.best.at[index] + offset;
         upper[index] = lower[index];
         let found = self.search.run(&start, [&lower, &upper], &self.cost);

@@ -15,13 +15,15 @@ use super::coordinates::Coordinates;
 use super::gamma_law::{GammaLaw, LnProbability};
 use super::minimise::Local;
 use super::sensitivity::derivatives;
-use super::table::{Place, Table};
+use super::table::{Angles, Place, Table};
 use crate::material::Observation;
 
 /// Rows that one task sums, fixed so that the sum is the same on any number of threads.
 const CHUNK: usize = 256;
+/// How much farther apart than usual the true angles of coarse rows are: one standard deviation of the error.
+const COARSENESS: f64 = 3.0;
 
-/// Which curvature a search uses. Only that of the scores has entries for the looks.
+/// Which curvature a search uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Curvature {
     /// d²(−ln g)/d(ln μ)² = L·y/μ along each chirp's mean gradient: long steps from afar, where the
@@ -36,6 +38,10 @@ pub(super) enum Curvature {
 pub(super) struct Likelihood<'a> {
     coordinates: &'a Coordinates,
     chirps: Vec<Chirp>,
+    /// The angles at which it needs a law.
+    pub angles: Angles,
+    /// True angles of all rows without a detection.
+    limits: usize,
 }
 
 /// One row; its power is in units of σ⁰.
@@ -44,50 +50,112 @@ struct Chirp {
     ln_sigma0: f64,
     noise: f64,
     censored: bool,
-    nodes: Vec<(Place, f64)>,
+    nodes: Vec<Node>,
 }
 
-/// The model at one point of the search, tabulated.
-struct Tables {
-    ln_sigma0: Table,
-    by_coordinate: Vec<Option<Table>>,
-    law: GammaLaw,
+/// A true angle that a row may have.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    theta_rad: f64,
+    place: Place,
+    ln_weight: f64,
+}
+
+/// The model at one point of a search, tabulated.
+pub(super) struct Tables {
+    /// ln σ⁰ at the angles.
+    pub ln_sigma0: Table,
+    /// Its derivative by each unknown of the search; none for the looks.
+    pub by_unknown: Vec<Option<Table>>,
+    /// The law of the speckle.
+    pub law: GammaLaw,
+}
+
+impl Tables {
+    /// The unknowns that do not change σ⁰.
+    fn looks(&self) -> impl Iterator<Item = usize> {
+        (0..self.by_unknown.len()).filter(|&index| self.by_unknown[index].is_none())
+    }
 }
 
 impl<'a> Likelihood<'a> {
     /// Prepares the rows; `noise_w` is the mean thermal power in each.
     pub fn new(coordinates: &'a Coordinates, rows: &[Observation], noise_w: f64) -> Likelihood<'a> {
-        let chirps = rows.iter().map(|row| Chirp::new(row, noise_w)).collect();
-        Likelihood { coordinates, chirps }
+        Likelihood::of_nodes(coordinates, rows, noise_w, 1.0)
+    }
+
+    /// The same with true angles that are so coarse that it only ranks laws.
+    pub fn coarse(
+        coordinates: &'a Coordinates,
+        rows: &[Observation],
+        noise_w: f64,
+    ) -> Likelihood<'a> {
+        Likelihood::of_nodes(coordinates, rows, noise_w, COARSENESS)
+    }
+
+    fn of_nodes(
+        coordinates: &'a Coordinates,
+        rows: &[Observation],
+        noise_w: f64,
+        coarseness: f64,
+    ) -> Likelihood<'a> {
+        let mut chirps: Vec<Chirp> =
+            rows.iter().map(|row| Chirp::new(row, noise_w, coarseness)).collect();
+        let limits = chirps.iter().filter(|chirp| chirp.censored).map(|c| c.nodes.len()).sum();
+        let theta_rad: Vec<f64> =
+            chirps.iter().flat_map(|c| &c.nodes).map(|n| n.theta_rad).collect();
+        // A law at the angles of a short curve is cheaper than at all knots.
+        let exact = Angles::exact(&theta_rad);
+        let angles = exact.map_or_else(
+            || Angles::knots().clone(),
+            |(angles, places)| {
+                let nodes = chirps.iter_mut().flat_map(|chirp| &mut chirp.nodes);
+                nodes.zip(places).for_each(|(node, place)| node.place = place);
+                angles
+            },
+        );
+        Likelihood { coordinates, chirps, angles, limits }
     }
 
     /// −ln likelihood, its gradient and a curvature.
     pub fn local(&self, curvature: Curvature, at: &DVector<f64>) -> Local {
-        let tables = self.tables(at);
+        self.local_of(curvature, &self.tables(at))
+    }
+
+    /// −ln likelihood of a tabulated model, its gradient and a curvature.
+    pub fn local_of(&self, curvature: Curvature, tables: &Tables) -> Local {
+        let unknowns = tables.by_unknown.len();
         let parts: Vec<Local> = self
             .chirps
             .par_chunks(CHUNK)
             .map(|chunk| {
-                let mut sum = Local::zero(at.len());
-                let mut scratch = Scratch::new(at.len());
+                let mut sum = Local::zero(unknowns);
+                let mut scratch = Scratch::new(unknowns);
                 for chirp in chunk {
-                    sum.value -= chirp.score(&tables, &mut scratch);
+                    sum.value -= chirp.score(tables, &mut scratch);
                     sum.add(-1.0, 0.0, &scratch.score);
                     match curvature {
                         Curvature::Scores => sum.add(0.0, 1.0, &scratch.score),
-                        Curvature::FromAfar => sum.add(0.0, scratch.bend, &scratch.gradient),
+                        Curvature::FromAfar => {
+                            sum.add(0.0, scratch.bend, &scratch.gradient);
+                            // Of the looks the products of the scores are all that is known.
+                            for index in tables.looks() {
+                                sum.curvature[(index, index)] += scratch.score[index].powi(2);
+                            }
+                        }
                     }
                 }
                 sum
             })
             .collect();
-        parts.into_iter().fold(Local::zero(at.len()), Local::merge)
+        parts.into_iter().fold(Local::zero(unknowns), Local::merge)
     }
 
     fn tables(&self, at: &DVector<f64>) -> Tables {
-        let ln_sigma0 = self.coordinates.table(at);
-        let by_coordinate = derivatives(self.coordinates, at, &ln_sigma0);
-        Tables { ln_sigma0, by_coordinate, law: GammaLaw::new(self.coordinates.looks(at)) }
+        let ln_sigma0 = self.coordinates.table(at, &self.angles);
+        let by_unknown = derivatives(self.coordinates, at, &self.angles, &ln_sigma0);
+        let law = GammaLaw::for_limits(self.coordinates.looks(at), self.limits);
+        Tables { ln_sigma0, by_unknown, law }
     }
 
     /// ln p of each row.
@@ -96,9 +164,23 @@ impl<'a> Likelihood<'a> {
         self.chirps.iter().map(|chirp| chirp.score(&tables, &mut scratch)).collect()
     }
 
+    /// ln p of all rows for a tabulated mean.
+    pub fn ln_p_of(&self, ln_sigma0: &Table, law: &GammaLaw) -> f64 {
+        self.chirps.iter().map(|chirp| chirp.ln_p(ln_sigma0, law)).sum()
+    }
+
+    /// The detected rows: ln σ⁰ and the most likely place of each among the angles.
+    pub fn detections(&self) -> impl Iterator<Item = (f64, &Place)> {
+        let detected = self.chirps.iter().filter(|chirp| !chirp.censored);
+        detected.filter_map(|chirp| {
+            let likeliest = |a: &&Node, b: &&Node| a.ln_weight.total_cmp(&b.ln_weight);
+            Some((chirp.ln_sigma0, &chirp.nodes.iter().max_by(likeliest)?.place))
+        })
+    }
+
     /// ln of the probability of a lower power than that of the row, for each row.
     pub fn ln_below(&self, at: &DVector<f64>) -> Vec<f64> {
-        let table = self.coordinates.table(at);
+        let table = self.coordinates.table(at, &self.angles);
         let law = GammaLaw::new(self.coordinates.looks(at));
         self.chirps.iter().map(|chirp| chirp.ln_below(&table, &law)).collect()
     }
@@ -124,14 +206,19 @@ impl Scratch {
 
 impl Chirp {
     /// Prepares a row that has a σ⁰ or a limit.
-    fn new(row: &Observation, noise_w: f64) -> Chirp {
+    fn new(row: &Observation, noise_w: f64, coarseness: f64) -> Chirp {
         let sigma0 = row.level_sigma0().unwrap_or(f64::NAN);
-        let angles = true_angles(row.theta_i_rad, row.theta_sd_rad.unwrap_or(0.0));
+        let angles = true_angles(row.theta_i_rad, row.theta_sd_rad.unwrap_or(0.0), coarseness);
+        let node = |(theta_rad, weight): (f64, f64)| Node {
+            theta_rad,
+            place: Place::new(theta_rad),
+            ln_weight: weight.ln(),
+        };
         Chirp {
             ln_sigma0: sigma0.ln(),
             noise: noise_w * sigma0 / row.power_w.unwrap_or(sigma0),
             censored: row.is_censored(),
-            nodes: angles.into_iter().map(|(t, weight)| (Place::new(t), weight.ln())).collect(),
+            nodes: angles.into_iter().map(node).collect(),
         }
     }
 
@@ -142,10 +229,25 @@ impl Chirp {
 
     /// ln of the probability of a lower power, averaged over the true angle.
     fn ln_below(&self, table: &Table, law: &GammaLaw) -> f64 {
+        self.averaged(table, |ln_mean| law.below(self.ln_sigma0, ln_mean).value)
+    }
+
+    /// ln p of the chirp.
+    fn ln_p(&self, table: &Table, law: &GammaLaw) -> f64 {
+        if self.censored {
+            return self.ln_below(table, law);
+        }
+        self.averaged(table, |ln_mean| law.detected(self.ln_sigma0, ln_mean).value)
+    }
+
+    /// ln of a probability, known by its logarithm for each ln of the mean, averaged over the true angle.
+    fn averaged(&self, table: &Table, ln_p: impl Fn(f64) -> f64) -> f64 {
+        if let [Node { place, .. }] = self.nodes.as_slice() {
+            return ln_p(self.ln_mean(table, place));
+        }
         let mut terms = Vec::with_capacity(self.nodes.len());
-        for (place, ln_weight) in &self.nodes {
-            let ln_mean = self.ln_mean(table, place);
-            terms.push(ln_weight + law.below(self.ln_sigma0, ln_mean).value);
+        for Node { place, ln_weight, .. } in &self.nodes {
+            terms.push(ln_weight + ln_p(self.ln_mean(table, place)));
         }
         ln_sum(&terms)
     }
@@ -155,7 +257,7 @@ impl Chirp {
         let Scratch { terms, laws, score, gradient, bend } = scratch;
         terms.clear();
         laws.clear();
-        for (place, ln_weight) in &self.nodes {
+        for Node { place, ln_weight, .. } in &self.nodes {
             let ln_mean = self.ln_mean(&tables.ln_sigma0, place);
             let law = if self.censored {
                 tables.law.below(self.ln_sigma0, ln_mean)
@@ -173,13 +275,14 @@ impl Chirp {
         score.fill(0.0);
         gradient.fill(0.0);
         *bend = 0.0;
-        for (((place, _), term), (law, share)) in self.nodes.iter().zip(&*terms).zip(&*laws) {
+        for ((Node { place, .. }, term), (law, share)) in self.nodes.iter().zip(&*terms).zip(&*laws)
+        {
             let weight = term / sum;
             if weight < 1e-9 {
                 continue;
             }
             *bend += weight * law.bend;
-            for (index, table) in tables.by_coordinate.iter().enumerate() {
+            for (index, table) in tables.by_unknown.iter().enumerate() {
                 let Some(table) = table else {
                     score[index] += weight * law.by_ln_looks;
                     continue;

@@ -60,6 +60,8 @@ pub enum Stop {
     Iterations,
     /// The cost is not finite at the start.
     NotFinite,
+    /// From other starts the search ended at a worse optimum, by more than chance explains.
+    StartsDisagree,
 }
 
 impl Stop {
@@ -71,6 +73,7 @@ impl Stop {
             Stop::Stuck => "stuck",
             Stop::Iterations => "iterations",
             Stop::NotFinite => "not-finite",
+            Stop::StartsDisagree => "starts-disagree",
         }
     }
 }

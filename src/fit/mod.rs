@@ -31,6 +31,8 @@ mod least_squares;
 mod likelihood;
 pub(crate) mod minimise;
 mod models;
+mod parts;
+mod projection;
 mod result;
 mod run;
 mod search;

@@ -8,7 +8,7 @@ use super::interval::DEVIATE_95;
 use super::minimise::Stop;
 use super::sensitivity::derivatives;
 use super::settings::Fit;
-use super::table::Place;
+use super::table::{Angles, Place};
 use super::verdict::Finding;
 use crate::brdf::{Brdf, Scattering, ThroughBeam};
 use crate::material::{CrossValidation, Estimate, Goodness};
@@ -79,8 +79,8 @@ impl FitResult {
     /// Directions that the data do not determine and numbers at a bound do not widen it.
     pub fn band(&self, theta_rad: f64) -> Band {
         let place = Place::new(theta_rad);
-        let here = self.coordinates.table(&self.at);
-        let by = derivatives(&self.coordinates, &self.at, &here);
+        let here = self.coordinates.table(&self.at, Angles::knots());
+        let by = derivatives(&self.coordinates, &self.at, Angles::knots(), &here);
         let slopes = by.iter().map(|table| table.as_ref().map_or(0.0, |table| table.at(&place)));
         let slopes = DVector::from_iterator(self.at.len(), slopes);
         let variance = slopes.dot(&(&self.covariance_searched * &slopes));

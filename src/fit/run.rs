@@ -2,6 +2,7 @@
 
 use super::coordinates::{Coordinates, LOOKS};
 use super::error::FitError;
+use super::parts::Parts;
 use super::result::FitResult;
 use super::settings::{Fit, Method};
 use super::summary::summarise;
@@ -22,8 +23,11 @@ impl Fit {
             Method::Censored => self.looks,
             Method::Mse { .. } | Method::Tls { .. } => Some(self.looks.unwrap_or(1.0)),
         };
-        let coordinates = Coordinates::new(start, &self.fixed, &self.bounds, looks)?
+        let mut coordinates = Coordinates::new(start, &self.fixed, &self.bounds, looks)?
             .seen_by(self.beam_rad.unwrap_or(0.0));
+        if self.method == Method::Censored {
+            coordinates.redundant = Parts::of(&coordinates).redundant;
+        }
         let unknowns = coordinates.len();
         if coordinates.list.iter().all(|c| c.name == LOOKS) {
             return Err(FitError::NothingFree);

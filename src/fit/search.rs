@@ -7,6 +7,7 @@ use super::interval::{End, Profile};
 use super::least_squares::{Deviations, Squares};
 use super::likelihood::{Curvature, Likelihood};
 use super::minimise::{Local, Minimise, Minimum, Stop};
+use super::projection::Projection;
 use super::settings::{Fit, Method};
 use super::shapes;
 use super::uncertainty::{Uncertainty, observed_information};
@@ -22,13 +23,19 @@ const APPROACH: usize = 40;
 const NEAR: f64 = 1.0;
 /// Steps with the second derivatives themselves, where the products of the scores do not arrive: of few rows they are a
 /// poor guide. They promise less than this at the end.
-const POLISH: Minimise = Minimise { iterations: 40, tolerance: 1e-5, patience: usize::MAX };
+const POLISH: Minimise = Minimise { iterations: 200, tolerance: 1e-5, patience: usize::MAX };
 /// Least second derivative that counts, as a share of the largest.
 const LEAST_BEND: f64 = 1e-12;
 /// Least squares ends when a step promises to lower the cost by less; its parameters are compared with other programs.
 const SQUARES_TOLERANCE: f64 = 1e-8;
 /// Loss of cost that still counts as the same optimum.
 const SAME: f64 = 0.01;
+/// Difference in ln p of two halves of the starts from which more shapes are tried: these cost little.
+const ALIKE: f64 = 0.1;
+/// Difference in ln p of two halves of the starts that is more than chance: one standard deviation of one number.
+const CHANCE: f64 = 0.5;
+/// How many times the usual shapes are tried, one after the other.
+const MORE_SHAPES: [usize; 3] = [1, 4, 16];
 
 /// The result of a search.
 pub(super) struct SearchResult {
@@ -81,18 +88,11 @@ impl Fit {
     fn search_likelihood(&self, coordinates: &Coordinates, rows: &[Observation]) -> SearchResult {
         let likelihood = Likelihood::new(coordinates, rows, self.noise_w.unwrap_or(0.0));
         let cost = |at: &DVector<f64>| likelihood.local(Curvature::Scores, at);
-        let approach = Minimise { iterations: APPROACH, tolerance: NEAR, patience: usize::MAX };
-        let search = likelihood_search();
-        // With free looks the search would explain a far start by strong speckle instead of improving it.
-        let (best, agreeing) = self.best(coordinates, rows, |start| {
-            let [lower, upper] = coordinates.holding_looks(start);
-            let near = approach
-                .run(start, [&lower, &upper], |at| likelihood.local(Curvature::FromAfar, at));
-            polished(coordinates, search_freely(&search, coordinates, &near.at, cost), cost)
-        });
+        let (best, agreeing) = self.likeliest(coordinates, rows, &likelihood);
         let information = observed_information(coordinates, &best.at, &best.local, cost);
-        let uncertainty = Uncertainty::new(coordinates, &best.at, &information);
-        let search = Minimise { tolerance: 1e3 * LIKELIHOOD_TOLERANCE, ..search };
+        let mut uncertainty = Uncertainty::new(coordinates, &best.at, &information);
+        uncertainty.join(&coordinates.redundant);
+        let search = Minimise { tolerance: 1e3 * LIKELIHOOD_TOLERANCE, ..likelihood_search() };
         let profile = Profile { coordinates, best: &best, uncertainty: &uncertainty, search, cost };
         let mut profiles = Vec::new();
         for index in 0..coordinates.len() {
@@ -100,6 +100,45 @@ impl Fit {
             profiles.push(if wanted { profile.interval(index) } else { None });
         }
         SearchResult { best, agreeing, uncertainty, profiles }
+    }
+
+    /// The most likely end of all searches, and how many of them reached it. The starts come from two halves of the
+    /// shapes, the given one with the second. Where the halves do not end alike, more shapes are tried.
+    fn likeliest(
+        &self,
+        coordinates: &Coordinates,
+        rows: &[Observation],
+        likelihood: &Likelihood,
+    ) -> (Minimum, usize) {
+        let mut best = search_from(coordinates, likelihood, &coordinates.start());
+        let mut costs = vec![best.local.value];
+        if self.starts == 1 {
+            return (best, 1);
+        }
+        let projection = Projection::new(coordinates, rows, self.noise_w.unwrap_or(0.0));
+        let counts = [self.starts / 2, (self.starts - 1) / 2].map(|count| count.max(1));
+        let mut least = [f64::INFINITY, best.local.value];
+        for factor in MORE_SHAPES {
+            for half in 0..2 {
+                for start in projection.starts(half, factor, counts[half]) {
+                    let found = search_from(coordinates, likelihood, &start);
+                    let value = found.local.value;
+                    costs.push(value);
+                    least[half] = least[half].min(value);
+                    if value < best.local.value || !best.local.value.is_finite() {
+                        best = found;
+                    }
+                }
+            }
+            if (least[0] - least[1]).abs() <= ALIKE {
+                break;
+            }
+        }
+        if (least[0] - least[1]).abs() > CHANCE {
+            best.stop = Stop::StartsDisagree;
+        }
+        let agreeing = costs.iter().filter(|cost| **cost - best.local.value <= SAME).count();
+        (best, agreeing.min(self.starts))
     }
 
     /// The lowest cost of all starts, and how many starts reached it.
@@ -131,18 +170,13 @@ impl Fit {
         }
         let rows = shapes::sample(rows);
         let mut starts = match self.method {
-            Method::Censored => {
-                let likelihood = Likelihood::new(coordinates, &rows, self.noise_w.unwrap_or(0.0));
-                let cost = |at: &DVector<f64>| likelihood.local(Curvature::FromAfar, at);
-                shapes::starts(coordinates, wanted, cost)
-            }
             Method::Tls { theta_sd_rad, level_sd_db } => {
                 let deviations = Deviations { theta_sd_rad, level_sd_db };
                 let squares = Squares::new(coordinates, &rows, deviations);
                 shapes::starts(coordinates, wanted, |at| squares.local(at))
             }
-            // In two pieces there is no cost of all numbers.
-            Method::Mse { .. } => Vec::new(),
+            // In two pieces there is no cost of all numbers; a likelihood has starts of its own.
+            Method::Mse { .. } | Method::Censored => Vec::new(),
         };
         for number in starts.len() + 1..=wanted {
             starts.push(drawn_start(coordinates, self.seed, number));
@@ -176,7 +210,27 @@ fn search_freely(
     start: &DVector<f64>,
     cost: impl Fn(&DVector<f64>) -> Local,
 ) -> Minimum {
-    search.run(start, [&coordinates.lower(), &coordinates.upper()], cost)
+    let [lower, upper] = coordinates.bounds(start);
+    search.run(start, [&lower, &upper], cost)
+}
+
+/// Where a search of the likelihood ends from a start that may be far.
+fn search_from(
+    coordinates: &Coordinates,
+    likelihood: &Likelihood,
+    start: &DVector<f64>,
+) -> Minimum {
+    let approach = Minimise { iterations: APPROACH, tolerance: NEAR, patience: usize::MAX };
+    let from_afar = |at: &DVector<f64>| likelihood.local(Curvature::FromAfar, at);
+    let cost = |at: &DVector<f64>| likelihood.local(Curvature::Scores, at);
+    // With free looks the search would explain a far start by strong speckle instead of improving it.
+    let [lower, upper] = coordinates.holding_looks(start);
+    let near = approach.run(start, [&lower, &upper], from_afar);
+    // Where angles are exact, this curvature is nearer to the true one than that of the scores.
+    let search = Minimise { iterations: APPROACH, ..likelihood_search() };
+    let near = search_freely(&search, coordinates, &near.at, from_afar);
+    let end = search_freely(&likelihood_search(), coordinates, &near.at, cost);
+    polished(coordinates, end, cost)
 }
 
 /// A search that did not arrive, continued with the second derivatives themselves.

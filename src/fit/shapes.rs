@@ -70,11 +70,26 @@ pub(crate) fn starts(
 }
 
 /// The ends of some searches, best first, without those whose shapes are near a better one's.
-fn best_apart(mut found: Vec<Minimum>, shapes: &[usize], usual: &[[f64; 2]]) -> Vec<DVector<f64>> {
-    found.retain(|one| one.local.value.is_finite());
-    found.sort_by(|a, b| a.local.value.total_cmp(&b.local.value));
+fn best_apart(found: Vec<Minimum>, shapes: &[usize], usual: &[[f64; 2]]) -> Vec<DVector<f64>> {
+    let ends = found.into_iter().map(|one| (one.local.value, one.at)).collect();
+    apart(ends, shapes, usual, usize::MAX)
+}
+
+/// Up to `most` points by their cost, best first, without those whose shapes are near a better one's and those
+/// without a cost.
+pub(super) fn apart(
+    mut found: Vec<(f64, DVector<f64>)>,
+    shapes: &[usize],
+    usual: &[[f64; 2]],
+    most: usize,
+) -> Vec<DVector<f64>> {
+    found.retain(|(cost, _)| cost.is_finite());
+    found.sort_by(|(a, _), (b, _)| a.total_cmp(b));
     let mut apart: Vec<DVector<f64>> = Vec::new();
-    for Minimum { at, .. } in found {
+    for (_, at) in found {
+        if apart.len() == most {
+            break;
+        }
         let is_near = |&i: &usize, other: &DVector<f64>| {
             (at[i] - other[i]).abs() < NEAR * (usual[i][1] - usual[i][0])
         };
@@ -110,7 +125,7 @@ fn is_level(coordinates: &Coordinates, index: usize) -> bool {
 
 /// Place `number` of a sequence that covers the unit cube evenly however far it is followed: multiples of the inverse powers of
 /// the root of x^(d + 1) = x + 1 (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences").
-fn evenly(number: usize, dimensions: usize) -> impl Iterator<Item = f64> {
+pub(super) fn evenly(number: usize, dimensions: usize) -> impl Iterator<Item = f64> {
     let root = (0..64).fold(2.0_f64, |x, _| (1.0 + x).powf(1.0 / (dimensions as f64 + 1.0)));
     (1..=dimensions).map(move |axis| (0.5 + (number + 1) as f64 / root.powi(axis as i32)).fract())
 }

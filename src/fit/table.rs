@@ -20,15 +20,48 @@ const THETA_END_RAD: f64 = 0.999 * FRAC_PI_2;
 /// ln σ⁰ that stands for 0.
 const LN_NOTHING: f64 = -600.0;
 
-/// The angle of every knot, rad.
-static THETA_RAD: LazyLock<Vec<f64>> = LazyLock::new(|| {
-    (0..=INTERVALS)
-        .map(|knot| THETA_END_RAD * (BETA * knot as f64 / INTERVALS as f64).sinh() / BETA.sinh())
-        .collect()
+/// The angle of every knot.
+static KNOTS: LazyLock<Angles> = LazyLock::new(|| {
+    let share = |knot: usize| (BETA * knot as f64 / INTERVALS as f64).sinh() / BETA.sinh();
+    Angles::these((0..=INTERVALS).map(|knot| THETA_END_RAD * share(knot)))
 });
 
 /// sinh β/θ_end: the argument of asinh per rad of θ, 1/rad.
 static STRETCH_PER_RAD: LazyLock<f64> = LazyLock::new(|| BETA.sinh() / THETA_END_RAD);
+
+/// The angles at which laws are tabulated: the knots, or the few angles that a curve has.
+#[derive(Clone, Debug)]
+pub(super) struct Angles {
+    to_radar: Vec<Direction<Surface>>,
+}
+
+impl Angles {
+    /// The knots, between which any angle is interpolated.
+    pub fn knots() -> &'static Angles {
+        &KNOTS
+    }
+
+    /// These angles, rad, and the place of each among them; `None` for more of them than there are knots, which are
+    /// the cheaper ones then.
+    pub fn exact(theta_rad: &[f64]) -> Option<(Angles, Vec<Place>)> {
+        let mut different = theta_rad.to_vec();
+        different.sort_by(f64::total_cmp);
+        different.dedup();
+        if different.len() > INTERVALS {
+            return None;
+        }
+        let place = |theta_rad: &f64| {
+            let knot = different.partition_point(|other| other < theta_rad) as u16;
+            Place { knots: [knot; 4], weights: [1.0, 0.0, 0.0, 0.0], slopes_per_rad: [0.0; 4] }
+        };
+        let places = theta_rad.iter().map(place).collect();
+        Some((Angles::these(different.into_iter()), places))
+    }
+
+    fn these(theta_rad: impl Iterator<Item = f64>) -> Angles {
+        Angles { to_radar: theta_rad.map(|theta| Direction::from_angles(theta, 0.0)).collect() }
+    }
+}
 
 /// ln σ⁰ at every knot.
 #[derive(Clone, Debug)]
@@ -49,15 +82,25 @@ pub(super) struct Place {
 
 impl Table {
     /// Tabulates a law as a beam of the divergence `beam_rad` sees it; without a beam, 0, the law itself.
-    pub fn new(law: &dyn Scattering, beam_rad: f64) -> Table {
-        let looks = THETA_RAD.iter().map(|theta| (beam_rad, Direction::from_angles(*theta, 0.0)));
-        let looks: Vec<(f64, Direction<Surface>)> = looks.collect();
+    pub fn new(law: &dyn Scattering, beam_rad: f64, angles: &Angles) -> Table {
+        let looks: Vec<(f64, Direction<Surface>)> =
+            angles.to_radar.iter().map(|to_radar| (beam_rad, *to_radar)).collect();
         let f_per_sr = Retro::new(law).per_sr(&looks);
         let ln_sigma0 = looks.iter().zip(f_per_sr).map(|((_, v), f_per_sr)| {
             let ln_sigma0 = (4.0 * PI * f_per_sr * v.cos_theta().powi(2)).ln();
             if ln_sigma0.is_nan() { LN_NOTHING } else { ln_sigma0.max(LN_NOTHING) }
         });
         Table { knots: ln_sigma0.collect() }
+    }
+
+    /// A table of these values, one for each of the angles.
+    pub fn of(knots: Vec<f64>) -> Table {
+        Table { knots }
+    }
+
+    /// ln σ⁰ at each of the angles.
+    pub fn values(&self) -> &[f64] {
+        &self.knots
     }
 
     /// (self − other)/width at every knot: a derivative by a parameter.
@@ -147,7 +190,7 @@ mod tests {
 
     #[test]
     fn the_derivatives_are_those_of_the_value() {
-        let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002), 0.0);
+        let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002), 0.0, Angles::knots());
         for theta_rad in [-0.4, -1e-3, 0.0123, 0.071, 0.3, 1.1] {
             let (place, bends) = Place::bending(theta_rad);
             let at = |step: f64| table.at(&Place::new(theta_rad + step));
@@ -169,7 +212,7 @@ mod tests {
     fn interpolation_keeps_a_ten_thousandth_of_a_decibel_up_to_80_degrees() {
         for m in [0.01, 0.05, 0.2] {
             let model = mixture(m, 6.0, 0.05, 0.002);
-            let table = Table::new(&model, 0.0);
+            let table = Table::new(&model, 0.0, Angles::knots());
             for step in 0..40_000 {
                 let theta_rad = 80f64.to_radians() * f64::from(step) / 40_000.0;
                 let exact = model.sigma0(theta_rad).ln();
@@ -182,8 +225,23 @@ mod tests {
     }
 
     #[test]
+    fn the_angles_of_a_short_curve_are_not_interpolated() {
+        let theta_rad = [0.3, 0.0, 1.2, 0.3, 0.05];
+        let (angles, places) = Angles::exact(&theta_rad).unwrap();
+        let model = mixture(0.05, 6.0, 0.05, 0.002);
+        let table = Table::new(&model, 0.0, &angles);
+        assert_eq!(table.values().len(), 4);
+        for (theta_rad, place) in theta_rad.iter().zip(&places) {
+            let exact = model.sigma0(*theta_rad).ln();
+            assert!((table.at(place) - exact).abs() < 1e-12, "{theta_rad}");
+        }
+        let many: Vec<f64> = (0..=INTERVALS).map(|i| i as f64 * 1e-3).collect();
+        assert!(Angles::exact(&many).is_none());
+    }
+
+    #[test]
     fn the_slope_is_the_derivative_on_both_sides_of_the_normal() {
-        let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002), 0.0);
+        let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002), 0.0, Angles::knots());
         for theta_rad in [-0.12, -0.01, 0.002, 0.1, 0.7] {
             let at = |theta| table.at(&Place::new(theta));
             let expected = (at(theta_rad + 1e-6) - at(theta_rad - 1e-6)) / 2e-6;
@@ -194,7 +252,7 @@ mod tests {
 
     #[test]
     fn any_angle_has_a_place() {
-        let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002), 0.0);
+        let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002), 0.0, Angles::knots());
         for theta_rad in [-9.0, 0.0, 1.57, FRAC_PI_2, 3.0, f64::NAN, f64::INFINITY] {
             let value = table.at(&Place::new(theta_rad));
             assert!(value.is_finite() || theta_rad.is_nan(), "{theta_rad}: {value}");

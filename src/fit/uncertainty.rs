@@ -110,6 +110,23 @@ impl Uncertainty {
         self.singular_values.sort_by(|a, b| b.total_cmp(a));
     }
 
+    /// Notes that each of some numbers changes the model only as another one does: the data determine neither.
+    pub fn join(&mut self, redundant: &[[usize; 2]]) {
+        for pair in redundant {
+            let [number, _] = *pair;
+            self.bounded[number] = false;
+            let is_known = |group: &Vec<usize>| pair.iter().all(|index| group.contains(index));
+            if self.together.iter().any(is_known) {
+                continue;
+            }
+            match self.together.iter_mut().find(|group| group.contains(&pair[1])) {
+                Some(group) => group.push(number),
+                None => self.together.push(vec![pair[1], number]),
+            }
+            self.singular_values.push(0.0);
+        }
+    }
+
     /// Standard deviation of a coordinate in the search.
     pub fn deviation(&self, index: usize) -> f64 {
         self.covariance[(index, index)].max(0.0).sqrt()

@@ -132,11 +132,12 @@ impl fmt::Display for Finding {
             ),
             Finding::NotConverged { stop } => {
                 let why = match stop {
+                    Stop::StartsDisagree => "other starts ended at worse fits",
                     Stop::Iterations => "the iterations ran out",
                     Stop::NotFinite => "the cost has no number",
                     _ => "no step improves although one should",
                 };
-                write!(f, "the search did not converge: {why}; do not use the numbers")
+                write!(f, "the search failed and did not converge: {why}; do not use the numbers")
             }
             Finding::StartsDisagree { agreeing, starts } => write!(
                 f,
