@@ -1,10 +1,13 @@
 //! The likelihood of the observations under a prediction.
 //!
-//! A detected power y has the density of Gamma(L, (μ + N)/L) in ln y. A chirp without a detection has the
+//! A detected power y has the density of Gamma(L, (μ + N)/L) in ln y, L the looks of its chirp: those of the speckle, and more
+//! where a part of the echo does not speckle ([`Receiver::looks_of`](crate::effects::Receiver::looks_of)). A chirp without a detection has the
 //! probability of staying below the threshold T, or below the false alarm that was reported instead. Both apply before
 //! a receiver that saturates. Where tilts vary at random the likelihood is averaged over them. Ranges are normal about the predicted
 //! ones. One in ten thousand chirps is an outlier of any power, so that a silhouette that the mesh misses
 //! costs a bounded amount.
+
+use std::borrow::Cow;
 
 use rayon::prelude::*;
 
@@ -54,6 +57,9 @@ pub(super) struct Term {
     pub pull: f64,
     /// −d² ln p/d(ln mean)², never negative.
     pub bend: f64,
+    /// ln of the looks, and d ln p/d ln looks.
+    pub ln_looks: f64,
+    pub looks_slope: f64,
     /// The part of the range in `ln_p`.
     pub ln_range: f64,
     /// Predicted range, m; 0 where nothing arrives.
@@ -76,12 +82,15 @@ impl<'a> Likelihood<'a> {
         Likelihood { prediction, declared, shared, law }
     }
 
-    /// ln of the mean power of a shot with thermal noise, and its weight, for every tilt.
-    pub fn ln_means(&self, shot: usize) -> impl Iterator<Item = (f64, f64)> {
-        let floor_w = NOTHING * self.declared.threshold_w;
-        let noise_w = self.prediction.receiver.noise_w;
-        let powers = self.prediction.powers_w(shot);
-        powers.map(move |(power_w, weight)| ((power_w + noise_w).max(floor_w).ln(), weight))
+    /// The mean power of a shot with thermal noise, its looks, and its weight, for every tilt.
+    pub fn means(&self, shot: usize) -> impl Iterator<Item = Mean> {
+        let Likelihood { prediction, declared, .. } = self;
+        let (floor_w, noise_w) = (NOTHING * declared.threshold_w, prediction.receiver.noise_w);
+        prediction.powers_w(shot).map(move |(power_w, weight)| Mean {
+            ln_mean: (power_w + noise_w).max(floor_w).ln(),
+            looks: prediction.looks(shot, power_w),
+            weight,
+        })
     }
 
     /// The part of every shot.
@@ -109,13 +118,16 @@ impl<'a> Likelihood<'a> {
             powers.flatten().map(|(power_w, _)| (power_w + noise_w).max(floor_w)).collect();
         ln_all(&mut ln_means);
         let mut laws = Vec::with_capacity(ln_means.len());
-        for (ln_means, ((_, seen), ln_seen)) in
+        for (ln_means, ((shot, seen), ln_seen)) in
             ln_means.chunks_exact(tilts).zip(seen.iter().zip(&ln_seen))
         {
-            laws.extend(ln_means.iter().map(|ln_mean| match seen.power_w {
-                Some(_) => self.detected(*ln_seen, *ln_mean),
-                None => self.limited(*ln_seen, *ln_mean),
-            }));
+            for (ln_mean, (power_w, _)) in ln_means.iter().zip(prediction.powers_w(*shot)) {
+                let law = self.law(prediction.looks(*shot, power_w));
+                laws.push(match seen.power_w {
+                    Some(_) => self.detected(&law, *ln_seen, *ln_mean),
+                    None => self.limited(&law, *ln_seen, *ln_mean),
+                });
+            }
         }
         let mut p_of_tilts: Vec<f64> = laws.iter().map(|law| law.value).collect();
         exp_all(&mut p_of_tilts);
@@ -139,17 +151,20 @@ impl<'a> Likelihood<'a> {
             ln_all(&mut ln_means);
         }
         let ranges = self.ranges(seen);
-        let most_pull = MOST_PULL * prediction.receiver.looks.sqrt();
         let each = seen.iter().zip(&ln_seen).zip(ln_means).zip(powers).zip(ln_p).zip(ranges);
         each.map(|(((((&(shot, _), ln_seen), ln_mean), power), ln_p), range)| {
             let weight = self.shared.weight(shot);
             let arrived = prediction.arrived.get(shot).copied().flatten();
+            let looks = prediction.looks(shot, arrived.map_or(0.0, |arrived| arrived.power_w));
+            let most_pull = MOST_PULL * looks.sqrt();
             Term {
                 ln_p: weight * ln_p + range.ln_p,
                 ln_mean: ln_mean - (self.entered(ln_mean, *ln_seen).0 - ln_seen),
                 slope: weight * power.slope / power.p,
                 pull: weight * power.pull.clamp(-most_pull, most_pull),
                 bend: weight * power.bend / power.p,
+                ln_looks: looks.ln(),
+                looks_slope: weight * power.looks_slope / power.p,
                 ln_range: range.ln_p,
                 range_m: arrived.map_or(0.0, |arrived| arrived.range_m),
                 range_slope: range.slope,
@@ -162,27 +177,39 @@ impl<'a> Likelihood<'a> {
 
     /// Probability that the power of a shot stays below a level, W.
     pub fn below(&self, shot: usize, level_w: f64) -> f64 {
-        self.ln_means(shot)
-            .map(|(ln_mean, weight)| weight * self.limited(level_w.ln(), ln_mean).value.exp())
-            .sum()
+        self.means(shot).map(|mean| mean.weight * self.below_of(&mean, level_w)).sum()
     }
 
     /// Probability that a power of this mean is detected.
-    pub fn chance(&self, ln_mean: f64) -> f64 {
-        1.0 - self.limited(self.declared.threshold_w.ln(), ln_mean).value.exp()
+    pub fn chance(&self, mean: &Mean) -> f64 {
+        1.0 - self.below_of(mean, self.declared.threshold_w)
+    }
+
+    /// Probability that a power of this mean stays below a level, W.
+    fn below_of(&self, mean: &Mean, level_w: f64) -> f64 {
+        self.limited(&self.law(mean.looks), level_w.ln(), mean.ln_mean).value.exp()
+    }
+
+    /// The law of so many looks.
+    fn law(&self, looks: f64) -> Cow<'_, GammaLaw> {
+        if looks == self.law.looks() {
+            Cow::Borrowed(&self.law)
+        } else {
+            Cow::Owned(GammaLaw::for_limits(looks, 1))
+        }
     }
 
     /// ln density of a detected power per unit of ln power.
-    fn detected(&self, ln_power: f64, ln_mean: f64) -> LnProbability {
+    fn detected(&self, law: &GammaLaw, ln_power: f64, ln_mean: f64) -> LnProbability {
         let (ln_power, slope) = self.entered(ln_mean, ln_power);
-        let law = self.law.detected(ln_power, ln_mean);
+        let law = law.detected(ln_power, ln_mean);
         let ln_slope = if slope == 1.0 { 0.0 } else { slope.ln() };
         LnProbability { value: law.value - ln_slope, ..law }
     }
 
     /// ln probability that the power stays below a limit.
-    fn limited(&self, ln_limit: f64, ln_mean: f64) -> LnProbability {
-        self.law.below(self.entered(ln_mean, ln_limit).0, ln_mean)
+    fn limited(&self, law: &GammaLaw, ln_limit: f64, ln_mean: f64) -> LnProbability {
+        law.below(self.entered(ln_mean, ln_limit).0, ln_mean)
     }
 
     /// ln of the power at the input of the receiver whose output is `ln_seen`, and the slope of the output by
@@ -233,6 +260,17 @@ impl<'a> Likelihood<'a> {
     }
 }
 
+/// The mean of a power, with thermal noise.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Mean {
+    /// ln of it, in W.
+    pub ln_mean: f64,
+    /// Looks of its law.
+    pub looks: f64,
+    /// Probability of the tilt under which it is this.
+    pub weight: f64,
+}
+
 /// The probability of a power, averaged over tilts, with p times its derivatives.
 #[derive(Clone, Copy, Default)]
 struct OfPower {
@@ -240,6 +278,7 @@ struct OfPower {
     slope: f64,
     pull: f64,
     bend: f64,
+    looks_slope: f64,
 }
 
 impl OfPower {
@@ -249,6 +288,7 @@ impl OfPower {
         self.slope += p * law.by_ln_mean;
         self.pull += weight * law.by_ln_mean;
         self.bend += p * law.bend;
+        self.looks_slope += p * law.by_ln_looks;
     }
 }
 

@@ -225,7 +225,9 @@ impl<'a> Problem<'a> {
                 let mut slopes = quotients(&more, &less, difference.width);
                 if is_law && is_plain {
                     for (slope, term) in slopes.iter_mut().zip(here) {
-                        slope.ln_p = term.slope * slope.ln_mean + slope.ln_range;
+                        slope.ln_p = term.slope * slope.ln_mean
+                            + term.looks_slope * slope.ln_looks
+                            + slope.ln_range;
                     }
                 }
                 slopes
@@ -295,6 +297,7 @@ pub(super) struct Slope {
     /// The part of the range in it.
     pub ln_range: f64,
     pub ln_mean: f64,
+    pub ln_looks: f64,
     pub range_m: f64,
 }
 
@@ -314,14 +317,19 @@ impl Slope {
             ln_p: self.ln_p + other.ln_p,
             ln_range: self.ln_range + other.ln_range,
             ln_mean: self.ln_mean + other.ln_mean,
+            ln_looks: self.ln_looks + other.ln_looks,
             range_m: self.range_m + other.range_m,
         }
     }
 
     fn times(self, by: f64) -> Slope {
-        let Slope { ln_p, ln_range, ln_mean, range_m } = self;
-        let (ln_p, ln_range) = (by * ln_p, by * ln_range);
-        Slope { ln_p, ln_range, ln_mean: by * ln_mean, range_m: by * range_m }
+        Slope {
+            ln_p: by * self.ln_p,
+            ln_range: by * self.ln_range,
+            ln_mean: by * self.ln_mean,
+            ln_looks: by * self.ln_looks,
+            range_m: by * self.range_m,
+        }
     }
 }
 
@@ -329,13 +337,14 @@ impl Slope {
 fn quotients(more: &[Term], less: &[Term], width: f64) -> Vec<Slope> {
     let per_width = if width > 0.0 { 1.0 / width } else { 0.0 };
     let pairs = more.iter().zip(less);
-    pairs
-        .map(|(a, b)| {
-            let (ln_p, ln_range) = (a.ln_p - b.ln_p, a.ln_range - b.ln_range);
-            let (ln_mean, range_m) = (a.ln_mean - b.ln_mean, a.range_m - b.range_m);
-            Slope { ln_p, ln_range, ln_mean, range_m }.times(per_width)
-        })
-        .collect()
+    let slopes = pairs.map(|(a, b)| Slope {
+        ln_p: a.ln_p - b.ln_p,
+        ln_range: a.ln_range - b.ln_range,
+        ln_mean: a.ln_mean - b.ln_mean,
+        ln_looks: a.ln_looks - b.ln_looks,
+        range_m: a.range_m - b.range_m,
+    });
+    slopes.map(|slope| slope.times(per_width)).collect()
 }
 
 /// ln likelihood.

@@ -211,7 +211,7 @@ impl Bench<'_> {
         }
         // Noise, speckle and the receiver.
         let mean_w = tilted_w + prediction.receiver.noise_w;
-        let drawn_w = mean_w * draws.gamma(prediction.receiver.looks);
+        let drawn_w = mean_w * draws.gamma(prediction.looks(shot, tilted_w));
         let power_w = prediction.saturating.passed_w(mean_w, drawn_w);
         let arrived = prediction.arrived.get(shot).copied().flatten();
         let range_m = arrived

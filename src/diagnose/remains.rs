@@ -4,7 +4,7 @@ use super::covariates::covariates;
 use super::evidence::Candidate;
 use super::field::Structure;
 use super::problem::Problem;
-use super::residual::{self, ResidualStructure, speckle_sd_db};
+use super::residual::{self, ResidualStructure, scatter_db};
 use super::scatter::Tests;
 use super::scorer::{SHARE_OF_FORM, Scorer};
 use super::settings::Diagnosis;
@@ -48,7 +48,7 @@ pub(super) fn find_unexplained(scorer: &Scorer, remainder: &Remainder) -> Vec<Re
         found.push(ResidualStructure { covariate, strength_db, p_value });
     }
     found.extend(residual::outliers(z, prediction, declared, observations, strays));
-    let sd_db = speckle_sd_db(prediction.receiver.looks);
+    let sd_db = scatter_db(prediction);
     let swing = scorer.swing(prediction, z);
     found.extend(swing.filter(|swing| swing.strength_db >= scorer.least_structure_db(largest_db)));
     found.extend(residual::steps(observations));

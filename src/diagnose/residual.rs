@@ -73,8 +73,24 @@ pub(super) fn z(
     all
 }
 
+/// Scatter of the powers of a prediction's shots by speckle, root mean square, dB.
+pub(super) fn scatter_db(prediction: &Prediction) -> f64 {
+    let arrived = prediction.arrived.iter().enumerate();
+    let waves = arrived.filter_map(|(shot, one)| Some((shot, one.as_ref()?)));
+    let mut waves = waves.filter(|(_, one)| one.coherent_share > 0.0).peekable();
+    let alike_db = speckle_sd_db(prediction.receiver.looks);
+    if waves.peek().is_none() {
+        return alike_db;
+    }
+    let count = prediction.arrived.len() as f64;
+    let less = waves.map(|(shot, one)| {
+        alike_db.powi(2) - speckle_sd_db(prediction.looks(shot, one.power_w)).powi(2)
+    });
+    (alike_db.powi(2) - less.sum::<f64>() / count).max(0.0).sqrt()
+}
+
 /// Standard deviation of ln y of L looks in dB: 10/ln 10·√ψ′(L).
-pub(super) fn speckle_sd_db(looks: f64) -> f64 {
+fn speckle_sd_db(looks: f64) -> f64 {
     let h = 1e-4 * looks;
     DB * ((digamma(looks + h) - digamma(looks - h)) / (2.0 * h)).max(0.0).sqrt()
 }

@@ -10,15 +10,12 @@ use super::settings::Diagnosis;
 use super::shots::trace_shots;
 use super::subject::Subject;
 use crate::brdf::Brdf;
-use crate::effects::{Antenna, Effect, Receiver, Stage, middle};
+use crate::effects::{Antenna, Effect, MOST_LOOKS, Receiver, Stage, middle};
 use crate::measure::Cloud;
 use crate::radar::{Link, Radar, RadarError, RangeProcessor};
 use crate::scene::Scene;
 use crate::trace::{Bvh, ScanGeometry};
 use crate::units::watts_from_dbm;
-
-/// Looks that represent a radar without speckle: a likelihood needs some spread.
-const MOST_LOOKS: f64 = 1e4;
 
 /// A scene and the cloud that was measured of it.
 #[derive(Clone, Copy)]
@@ -148,6 +145,7 @@ pub fn declared_receiver(radar: &Radar) -> Result<(Receiver, ReceiverLimits), Ra
             RangeProcessor::new(&of_ranges, &radar.chirp(), radar.threshold_dbm, looks)?;
         (receiver.noise_w, threshold_w) = (processor.noise_per_bin_w(), processor.threshold_w());
     }
+    // A likelihood needs some spread, also of a radar without speckle.
     receiver.looks = receiver.looks.min(MOST_LOOKS);
     Ok((receiver, ReceiverLimits { threshold_w, range_sd_m }))
 }

@@ -7,7 +7,7 @@
 
 use super::covariates::{Covariate, quantiles};
 use super::folds::{Folds, square};
-use super::residual::{ResidualStructure, speckle_sd_db};
+use super::residual::{ResidualStructure, scatter_db};
 use crate::effects::{Prediction, Shot};
 use crate::radar::random::{Key, Purpose};
 
@@ -53,7 +53,7 @@ impl Tests {
         let centred: Vec<f64> = whole.iter().map(|square| square - mean).collect();
         let bins = self.bins(shots, covariates);
         let limit = self.family_error / (bins.len() as f64).max(1.0);
-        let sd_db = speckle_sd_db(prediction.receiver.looks);
+        let sd_db = scatter_db(prediction);
         let mut found = Vec::new();
         for (number, Bins { over, bin }) in (0..).zip(&bins) {
             let (squares, covariate) = match over {

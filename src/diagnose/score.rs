@@ -8,7 +8,7 @@ use serde::Serialize;
 use statrs::function::gamma::ln_gamma;
 
 use super::folds::Folds;
-use super::likelihood::Likelihood;
+use super::likelihood::{Likelihood, Mean};
 pub(super) use super::observation::DB;
 use super::observation::ReceiverLimits;
 use super::problem::Problem;
@@ -94,6 +94,12 @@ impl MomentTable {
     }
 }
 
+/// Mean and variance of ln(y/mean) above ln(T/mean) for a number of looks without a table.
+fn moments(looks: f64, ln_threshold: f64) -> [f64; 2] {
+    let [mean, variance] = moments_above(looks, ln_threshold.clamp(FIRST, LAST));
+    [mean + (ln_threshold - LAST).max(0.0), variance]
+}
+
 /// Mean and variance of ln(y/mean) above a threshold, by the midpoint rule from the threshold or, where that is
 /// lower, from where the density begins.
 fn moments_above(looks: f64, ln_threshold: f64) -> [f64; 2] {
@@ -162,12 +168,16 @@ fn detected_moments(
 ) -> [f64; 2] {
     let ln_threshold = declared.threshold_w.ln();
     let mut sums = [0.0; 3];
-    for (ln_mean, weight) in likelihood.ln_means(shot) {
+    for one in likelihood.means(shot) {
+        let Mean { ln_mean, looks, weight } = one;
         // Detections far above their mean lie at the threshold.
         let passed = prediction.saturating.of(ln_mean.max(ln_threshold - FARTHEST));
-        let [mean, variance] = table.at((ln_threshold - passed.ln_mean) / passed.slope);
+        let from = (ln_threshold - passed.ln_mean) / passed.slope;
+        let is_tabulated = looks == prediction.receiver.looks;
+        let [mean, variance] =
+            if is_tabulated { table.at(from) } else { moments(looks, from) };
         let variance = passed.slope * passed.slope * variance;
-        let chance = if weight == 1.0 { 1.0 } else { likelihood.chance(ln_mean) };
+        let chance = if weight == 1.0 { 1.0 } else { likelihood.chance(&one) };
         let (mean, weight) = (passed.ln_mean + passed.slope * mean, weight * chance.max(1e-300));
         for (sum, part) in sums.iter_mut().zip([1.0, mean, variance + mean * mean]) {
             *sum += weight * part;

@@ -10,7 +10,7 @@ use super::optima;
 use super::order;
 use super::problem::{Problem, Sample};
 use super::refit::{Fit, SCOUT, SEARCH};
-use super::residual::{self, ResidualStructure, speckle_sd_db};
+use super::residual::{self, ResidualStructure, scatter_db};
 use super::score::{Errors, Score, errors, scores};
 use super::settings::Diagnosis;
 use super::shared::SharedSpeckle;
@@ -215,7 +215,7 @@ impl Scorer<'_> {
 
     /// The residual that neighbours share.
     pub fn shared(&self, prediction: &Prediction, z: &[f64]) -> ResidualStructure {
-        let sd_db = speckle_sd_db(prediction.receiver.looks);
+        let sd_db = scatter_db(prediction);
         let spot_m = self.spot_m();
         let from_m = spot_m.max(self.problem.shared.reach_m);
         residual::of_neighbours(z, self.problem.shots, [from_m, spot_m], sd_db, self.folds)
@@ -224,7 +224,7 @@ impl Scorer<'_> {
     /// The swing of residuals with the chirp number.
     pub fn swing(&self, prediction: &Prediction, z: &[f64]) -> Option<ResidualStructure> {
         let Problem { shots, shared, .. } = self.problem;
-        let sd_db = speckle_sd_db(prediction.receiver.looks);
+        let sd_db = scatter_db(prediction);
         let (mut from, mut found) = (0, None::<ResidualStructure>);
         for shots in shots.chunk_by(|a, b| a.scan == b.scan) {
             let swing = order::swing(&z[from..from + shots.len()], shots, shared, sd_db);
@@ -297,5 +297,6 @@ impl Scorer<'_> {
 
 /// The receiver with much speckle, under which no shot of the right target is far off.
 pub(super) fn with_wide_speckle(receiver: Receiver) -> Receiver {
-    Receiver { looks: receiver.looks.min(WIDE_LOOKS), ..receiver }
+    let looks = receiver.looks.min(WIDE_LOOKS);
+    Receiver { looks, most_looks: looks, ..receiver }
 }

@@ -1,7 +1,7 @@
 //! How much a model changes the data.
 
 use super::observation::Observation;
-use super::residual::speckle_sd_db;
+use super::residual::scatter_db;
 use super::score::DB;
 use crate::effects::Prediction;
 
@@ -22,8 +22,7 @@ impl Size {
             let [now, then] = [after, before].map(|p| p.passed_w(shot).max(f64::MIN_POSITIVE).ln());
             changes.push(DB * (now - then));
         }
-        let by_speckle =
-            wider([after, before].map(|prediction| speckle_sd_db(prediction.receiver.looks)));
+        let by_speckle = wider([after, before].map(scatter_db));
         let by_tilts = wider([after, before].map(tilt_spread_db));
         Size { mean_db: rms(&changes), spread_db: by_speckle.max(by_tilts) }
     }

@@ -47,6 +47,7 @@ pub use library::{find, library};
 pub(crate) use member::family;
 pub use model::{Model, Prediction, PredictionCache, Tilts};
 pub use place::Place;
+pub(crate) use receiver::MOST_LOOKS;
 pub use receiver::Receiver;
 pub use shot::{Shot, Stage, middle};
 pub use tilt::tilted_cos_theta;

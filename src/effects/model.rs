@@ -12,7 +12,7 @@ use super::effect::{Effect, Survey};
 use super::intersection::moved;
 use super::library::pose::Pose as PoseEffect;
 use super::receiver::Receiver;
-use super::shot::{Shot, Stage};
+use super::shot::{Shot, Stage, returns_wave};
 use super::tilt::{NODES, nodes, tilted_cos_theta};
 use super::twist::Twist;
 use super::way_back::WayBack;
@@ -60,6 +60,8 @@ pub struct PredictionCache {
     intersections: Cache<Vec<Key>, Vec<Option<Intersection>>>,
     /// f of the scattering models without effects, 1/sr, by the models and the effects that move the target.
     scattered: Cache<(Vec<Brdf>, Vec<Key>), Vec<f64>>,
+    /// The coherent share of each echo, by the same; empty where no model returns a wave.
+    coherent: Cache<(Vec<Brdf>, Vec<Key>), Vec<f64>>,
     /// The product of all gains.
     gains: Cache<Vec<Key>, Vec<f64>>,
 }
@@ -106,6 +108,16 @@ impl Prediction {
         let power_w = arrived.map_or(0.0, |arrived| arrived.power_w).max(0.0);
         let tilts = self.tilts.get(shot).map_or(AS_IT_IS, |tilts| tilts);
         tilts.iter().map(move |(factor, weight)| (power_w * factor, *weight))
+    }
+
+    /// Looks of a shot's power, whose mean without noise is `power_w`, W: more than those of the speckle where a part of the
+    /// echo does not speckle.
+    pub fn looks(&self, shot: usize, power_w: f64) -> f64 {
+        let share = self.arrived.get(shot).copied().flatten().map_or(0.0, |a| a.coherent_share);
+        if share == 0.0 {
+            return self.receiver.looks;
+        }
+        self.receiver.looks_of(share * power_w / (power_w + self.receiver.noise_w))
     }
 
     /// Mean power of a shot with thermal noise before the receiver, W.
@@ -165,7 +177,11 @@ impl Model<'_> {
         let make = || self.intersect_all(stage, shots);
         let intersections = cache.intersections.get_or_make(moving.clone(), make);
         // f of the scattering models and the gains, in caches of their own, since they depend on different values.
-        let f_per_sr = cache.scattered.get_or_make((self.laws.clone(), moving), || {
+        let key = (self.laws.clone(), moving);
+        let coherent = cache
+            .coherent
+            .get_or_make(key.clone(), || self.coherent_shares(stage, &intersections));
+        let f_per_sr = cache.scattered.get_or_make(key, || {
             let laws = self.retros();
             let tasks = intersections.par_chunks(SHOTS_PER_TASK);
             tasks.map(|shots| self.f_per_sr(stage, &laws, shots)).collect::<Vec<_>>().concat()
@@ -179,10 +195,13 @@ impl Model<'_> {
             .par_iter()
             .zip(&*f_per_sr)
             .zip(&*gains)
-            .map(|((intersection, f_per_sr), gain)| {
+            .enumerate()
+            .map(|(shot, ((intersection, f_per_sr), gain))| {
                 let intersection = intersection.as_ref()?;
                 let power_w = gain * self.scattered_w(stage, intersection, *f_per_sr);
-                Some(MeanEcho::at_once(power_w, intersection.range_m()))
+                let coherent_share = coherent.get(shot).copied().unwrap_or(0.0);
+                let echo = MeanEcho::at_once(power_w, intersection.range_m());
+                Some(MeanEcho { coherent_share, ..echo })
             })
             .collect();
         let receiver = self.received();
@@ -252,6 +271,24 @@ impl Model<'_> {
         }
         let hits = shots.iter().map(Option::as_ref);
         hits.map(|hit| hit.map_or(0.0, |hit| bistatic_per_sr(stage, &self.laws, hit))).collect()
+    }
+
+    /// The coherent share of the echo of every shot; empty where no law returns a wave.
+    fn coherent_shares(&self, stage: &Stage, shots: &[Option<Intersection>]) -> Vec<f64> {
+        if !self.laws.iter().any(|law| returns_wave(law, stage.middle_divergence_rad())) {
+            return Vec::new();
+        }
+        let share = |at: &Option<Intersection>| {
+            let Some(Intersection { shot, to_radar, way_back }) = at else { return 0.0 };
+            let Some(law) = self.laws.get(usize::from(shot.region)) else { return 0.0 };
+            let beam_rad = stage.divergence_rad(shot);
+            let seen = match way_back {
+                None => law.seen_by(beam_rad, *to_radar, *to_radar),
+                Some(way) => way.seen(law, beam_rad),
+            };
+            seen.coherent_share
+        };
+        shots.par_iter().map(share).collect()
     }
 
     /// The laws, to be asked for backscatter alone.

@@ -3,7 +3,8 @@
 use glam::DVec3;
 
 use super::antenna::Antenna;
-use crate::brdf::widening_rad;
+use super::receiver::LEAST_COHERENT;
+use crate::brdf::{Brdf, Scattering, widening_rad};
 use crate::frames::{Direction, Global, Point, Pose, Ray, Surface};
 use crate::radar::{Chirps, GaussianBeam, Link};
 use crate::trace::{Hit, ScanGeometry};
@@ -118,6 +119,11 @@ impl Stage<'_> {
         self.widening_rad(shot.region, self.divergence_rad(shot))
     }
 
+    /// Divergence of the beam in the middle of the field, rad.
+    pub(super) fn middle_divergence_rad(&self) -> f64 {
+        self.link.beam.towards(0.0, 0.0).divergence_rad()
+    }
+
     /// Divergence of the beam at a shot, rad.
     pub(crate) fn divergence_rad(&self, shot: &Shot) -> f64 {
         let beam = self.beam(shot);
@@ -127,6 +133,13 @@ impl Stage<'_> {
             beam.divergence_rad()
         }
     }
+}
+
+/// Whether a surface returns to a beam of a divergence, rad, a part of its echo in one wave that counts: face on, where its
+/// lobes are strongest.
+pub(super) fn returns_wave(law: &Brdf, beam_rad: f64) -> bool {
+    let facing = Direction::from_angles(0.0, 0.0);
+    law.seen_by(beam_rad, facing, facing).coherent_share > LEAST_COHERENT
 }
 
 /// Mean of the intersections of the shots, m, global frame; the origin without shots.

@@ -166,7 +166,7 @@ fn is_sound(prediction: &Prediction) -> bool {
         let MeanEcho { power_w, range_m, .. } = *arrived;
         power_w.is_finite() && power_w >= 0.0 && range_m.is_finite() && range_m > 0.0
     });
-    let Receiver { looks, noise_w, tilt_sd_rad, ceiling } = prediction.receiver;
+    let Receiver { looks, noise_w, tilt_sd_rad, ceiling, .. } = prediction.receiver;
     let receiver = [looks, noise_w, tilt_sd_rad].iter().all(|v| v.is_finite())
         && ceiling.saturation_w > 0.0
         && ceiling.knee > 0.0;

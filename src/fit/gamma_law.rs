@@ -120,6 +120,11 @@ impl GammaLaw {
         }
     }
 
+    /// The looks.
+    pub fn looks(&self) -> f64 {
+        self.looks
+    }
+
     /// ln density of a detected power, per unit of ln power.
     pub fn detected(&self, ln_power: f64, ln_mean: f64) -> LnProbability {
         let ln_ratio = ln_power - ln_mean;
@@ -222,11 +227,13 @@ mod tests {
     fn the_table_and_every_derivative_agree_with_differences() {
         for looks in [0.5, 1.0, 4.0, 30.0, 1000.0] {
             let law = GammaLaw::new(looks);
+            let anew = GammaLaw::for_limits(looks, 1);
             let up = GammaLaw::new(looks * 1e-4f64.exp());
             let down = GammaLaw::new(looks * (-1e-4f64).exp());
             for ln_ratio in [-9.3, -2.0, -0.11, 0.0, 0.02, 0.7, 2.0] {
                 let exact = ln_lower_gamma(looks, looks * f64::exp(ln_ratio));
                 let found = law.below(ln_ratio, 0.0);
+                assert!((anew.below(ln_ratio, 0.0).value - exact).abs() <= 1e-12 * exact.abs());
                 assert!(
                     (found.value - exact).abs() < 1e-6 * (1.0 + exact.abs()),
                     "{looks} {ln_ratio}"

@@ -13,7 +13,7 @@ use crate::effects::cache::Cache;
 use crate::effects::echo::MeanEcho;
 use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level, Setting, Survey};
 use crate::effects::intersection::{Facet, HitSurface, surface_at};
-use crate::effects::shot::{Shot, Stage};
+use crate::effects::shot::{Shot, Stage, returns_wave};
 use crate::effects::spread::sunflower;
 use crate::frames::{Direction, Global, Ray, Surface};
 use crate::radar::GaussianBeam;
@@ -81,6 +81,8 @@ struct SpotRay {
     number: u8,
     /// How far the beam that sees it widens its lobes, rad.
     beam_rad: f64,
+    /// Divergence of that beam, rad.
+    divergence_rad: f64,
 }
 
 impl SpotRay {
@@ -95,13 +97,22 @@ impl SpotRay {
         let Hit { range_m, cos_theta, .. } = *hit;
         let watts_per_f = stage.link.power_w(beam, range_m, cos_theta, 1.0);
         // The rays stand on the wavefront, whose curvature is the rest of the divergence.
-        let beam_rad = stage.widening_rad(region, beam.section(range_m).divergence_rad());
-        SpotRay { range_m, to_radar, watts_per_f, region, number, beam_rad }
+        let divergence_rad = beam.section(range_m).divergence_rad();
+        let beam_rad = stage.widening_rad(region, divergence_rad);
+        SpotRay { range_m, to_radar, watts_per_f, region, number, beam_rad, divergence_rad }
     }
 
     /// Its power, W, from one region with an f of a beam's divergence, rad, and a direction, 1/sr.
     fn power_w(&self, region: u16, f: impl Fn(f64, Direction<Surface>) -> f64) -> f64 {
         if self.region == region { self.watts_per_f * f(self.beam_rad, self.to_radar) } else { 0.0 }
+    }
+
+    /// The part of its power, W, that is one wave.
+    fn coherent_w(&self, laws: &[Brdf]) -> f64 {
+        let Some(law) = laws.get(usize::from(self.region)) else { return 0.0 };
+        let seen_by = |beam_rad| law.seen_by(beam_rad, self.to_radar, self.to_radar);
+        let share = seen_by(self.divergence_rad).coherent_share;
+        if share == 0.0 { 0.0 } else { self.watts_per_f * share * seen_by(self.beam_rad).f_per_sr }
     }
 }
 
@@ -111,6 +122,8 @@ type Spot = (SpotRay, Vec<SpotRay>);
 /// The spots of all shots.
 struct Spots {
     all: Vec<Option<Spot>>,
+    /// Divergence of the beam in the middle of the field, rad.
+    divergence_rad: f64,
     /// Diameter of the beam at each, m.
     of_beam_m: Vec<f64>,
     /// Their answers to terms of level 1, for a diameter in bits: a law's levels change more often than its shape.
@@ -123,6 +136,9 @@ struct ShadedSpots {
     laws: Vec<Brdf>,
     /// Answers to laws that are no sums of terms, by region and diameter.
     sums: Cache<(u16, u64), Vec<Sums>>,
+    /// Whether a law returns a wave, and its power in each spot, W, by diameter.
+    has_waves: bool,
+    waves: Cache<u64, Vec<f64>>,
 }
 
 /// What a spot sends back from one region by one term of its law.
@@ -218,17 +234,33 @@ impl Spots {
         region: u16,
         f: impl Fn(f64, Direction<Surface>) -> f64 + Sync,
     ) -> Vec<Sums> {
+        self.weighed(diameter, |spot, weights| Sums::of(spot, weights, region, &f))
+    }
+
+    /// Power that every spot returns in one wave, W.
+    fn coherent_w(&self, diameter: Diameter, laws: &[Brdf]) -> Vec<f64> {
+        self.weighed(diameter, |(_, spot), weights| {
+            let rays = spot.iter().map(|ray| (weights[usize::from(ray.number)], ray));
+            rays.filter(|(weight, _)| *weight > 0.0).map(|(w, ray)| w * ray.coherent_w(laws)).sum()
+        })
+    }
+
+    /// Something of every spot by the weights of its rays; nothing of one that misses.
+    fn weighed<T: Default + Send>(
+        &self,
+        diameter: Diameter,
+        of: impl Fn(&Spot, &[f64; RAYS]) -> T + Sync,
+    ) -> Vec<T> {
         let common = match diameter {
             Diameter::Of(diameter_m) => Some(weights(diameter_m)),
             Diameter::OfBeam => None,
         };
         let spots = self.all.par_iter().zip(&self.of_beam_m);
-        let sums = spots.map(|(spot, of_beam_m)| {
-            let Some(spot) = spot else { return Sums::default() };
-            let weights = common.unwrap_or_else(|| weights(*of_beam_m));
-            Sums::of(spot, &weights, region, &f)
+        let weighed = spots.map(|(spot, of_beam_m)| {
+            let Some(spot) = spot else { return T::default() };
+            of(spot, &common.unwrap_or_else(|| weights(*of_beam_m)))
         });
-        sums.collect()
+        weighed.collect()
     }
 }
 
@@ -266,20 +298,25 @@ fn spots(stage: &Stage, shots: &[Shot]) -> Spots {
         let range_m = centre.as_ref().map_or(beam.focus_m, |hit| hit.range_m);
         beam.section(range_m).fwhm_m()
     });
-    Spots { all, of_beam_m: of_beam.collect(), sums: Cache::default() }
+    let of_beam_m = of_beam.collect();
+    Spots { all, divergence_rad: stage.middle_divergence_rad(), of_beam_m, sums: Cache::default() }
 }
 
 /// Shades the traced rays of a list of shots with some laws.
 fn shaded(survey: &Survey, laws: &[Brdf]) -> Survey {
     let Some(spots) = survey.downcast_ref::<Arc<Spots>>() else { return Box::new(()) };
+    let has_waves = laws.iter().any(|law| returns_wave(law, spots.divergence_rad));
     let (spots, laws) = (spots.clone(), laws.to_vec());
-    Box::new(ShadedSpots { spots, laws, sums: Cache::default() })
+    let (sums, waves) = (Cache::default(), Cache::default());
+    Box::new(ShadedSpots { spots, laws, sums, has_waves, waves })
 }
 
 /// Averages the echoes of some shots over spots of a diameter.
 fn average(diameter: Diameter, shaded: &Survey, arrived: &mut [Option<MeanEcho>]) {
     let Some(shaded) = shaded.downcast_ref::<ShadedSpots>() else { return };
     let answers = shaded.answers(diameter);
+    let make = || shaded.spots.coherent_w(diameter, &shaded.laws);
+    let waves = shaded.has_waves.then(|| shaded.waves.get_or_make(diameter.key(), make));
     arrived.par_iter_mut().enumerate().for_each(|(shot, one)| {
         let sums = answers.iter().filter_map(|(level, of)| Some((*level, of.get(shot)?)));
         let sums = sums.fold(Sums::default(), |sums, (level, of)| sums.and(level, of));
@@ -288,6 +325,7 @@ fn average(diameter: Diameter, shaded: &Survey, arrived: &mut [Option<MeanEcho>]
             one.power_w = averaged.mean_w * gain.clamp(1.0 / MOST_GAIN, MOST_GAIN);
             one.range_m += averaged.longer_m;
             one.spread_m = one.spread_m.hypot(averaged.spread_m);
+            one.coherent_share = waves.as_ref().map_or(0.0, |waves| waves[shot] / averaged.mean_w);
         }
     });
 }
@@ -471,6 +509,25 @@ mod tests {
         }
     }
 
+    /// A spot on a plane sees one wave as its axis does: of a lobe as narrow as the beam δ, half of what is specular.
+    #[test]
+    fn a_plane_returns_the_wave_of_its_law() {
+        let bench = Bench::of(solids::plate(2.0, 2.0));
+        let divergence_rad = bench.stage().middle_divergence_rad();
+        let laws = vec![Brdf::CookTorrance(CookTorrance { m: divergence_rad, ..lobe() })];
+        let receiver = Receiver { looks: 4.0, noise_w: 0.0, ..Receiver::LINEAR };
+        let echoes = |effects| {
+            let model = Model { laws: laws.clone(), receiver, effects, level: 1.0 };
+            model.predict(&bench.stage(), &bench.shots).arrived
+        };
+        let alone = echoes(Vec::new());
+        let averaged = echoes(vec![(&FiniteSpot as &dyn Effect, vec![0.016])]);
+        for (a, b) in alone.iter().flatten().zip(averaged.iter().flatten()) {
+            assert!((a.coherent_share - 0.5).abs() < 0.02, "{a:?}");
+            assert!((b.coherent_share - 0.5).abs() < 0.02, "{b:?}");
+        }
+    }
+
     #[test]
     fn a_spot_of_almost_no_width_is_a_ray() {
         let bench = Bench::sphere();
@@ -510,11 +567,13 @@ mod tests {
             region,
             number: (100.0 * theta_rad) as u8,
             beam_rad: 0.3 * theta_rad,
+            divergence_rad: 0.3 * theta_rad,
         };
         let over_a_border = (ray(0, 0.1), vec![ray(0, 0.2), ray(1, 0.3), ray(1, 0.05)]);
         let all = vec![Some(over_a_border), None, Some((ray(1, 0.2), vec![ray(1, 0.25)]))];
         let of_beam_m = vec![0.02; all.len()];
-        let spots = Arc::new(Spots { all: all.clone(), of_beam_m, sums: Cache::default() });
+        let (divergence_rad, sums) = (0.01, Cache::default());
+        let spots = Arc::new(Spots { all: all.clone(), divergence_rad, of_beam_m, sums });
         let law = |f_lambda: f64, m: f64| paint(CookTorrance { f_lambda, m, ..lobe() });
         let tabled = Brdf::Lambert(Lambert { albedo: 0.5 });
         let first = [law(0.2, 0.2), law(0.1, 0.3)];

@@ -104,36 +104,36 @@ struct Detour {
 }
 
 impl Detour {
-    fn power_w(&self, laws: &[Brdf], in_phase: bool) -> f64 {
+    /// Power received, W, and the part of it that is one wave.
+    fn powers_w(&self, laws: &[Brdf], in_phase: bool) -> [f64; 2] {
         let [first, second] = self.regions.map(|region| laws.get(usize::from(region)));
-        let (Some(first), Some(second)) = (first, second) else { return 0.0 };
+        let (Some(first), Some(second)) = (first, second) else { return [0.0; 2] };
         let [i, o] = self.first;
         if !self.is_mirrored {
             let first = first.apart_from_narrow_lobes(i, o);
-            return self.watts
-                * first.f_per_sr
-                * self.received_per_sr(second, first, 0.0, in_phase);
+            let sent_w = self.watts * first.f_per_sr;
+            return self.received_per_sr(second, first, 0.0, in_phase).map(|f| sent_w * f);
         }
-        let mut power_w = 0.0;
+        let mut powers_w = [0.0; 2];
         for NarrowLobe { share, m } in first.narrow_lobes(i) {
-            let first = Seen::mirror(0.0);
-            power_w += self.watts * share * self.received_per_sr(second, first, m, in_phase);
+            let received = self.received_per_sr(second, Seen::mirror(0.0), m, in_phase);
+            for (power_w, f_per_sr) in powers_w.iter_mut().zip(received) {
+                *power_w += self.watts * share * f_per_sr;
+            }
         }
-        power_w
+        powers_w
     }
 
     /// f of the second surface, 1/sr, as the beam sees it by way of a lobe of the roughness m, with what the same way round
-    /// the other way adds.
-    fn received_per_sr(&self, law: &Brdf, first: Seen, m: f64, in_phase: bool) -> f64 {
+    /// the other way adds; and the part of it that is one wave.
+    fn received_per_sr(&self, law: &Brdf, first: Seen, m: f64, in_phase: bool) -> [f64; 2] {
         let ([i, o], beam_rad) = (self.second, self.beam_rad.hypot(m));
         let last = law.seen_by(beam_rad, i, o);
-        if !in_phase {
-            return last.f_per_sr;
-        }
-        // The coherent part is one wave already.
         let narrowed = (self.beam_rad / beam_rad).powi(2);
         let coherent_share = first.coherent_share * last.coherent_share * narrowed;
-        last.f_per_sr * (2.0 - coherent_share)
+        // The coherent part is one wave already.
+        let enhancement = if in_phase { 2.0 - coherent_share } else { 1.0 };
+        [last.f_per_sr * enhancement, last.f_per_sr * coherent_share]
     }
 }
 
@@ -209,7 +209,9 @@ struct Bounce {
 impl Bounce {
     fn new(laws: &[Brdf], detour: &Detour, in_phase: bool) -> Bounce {
         let Detour { pattern, beside_m, range_m, .. } = *detour;
-        let echo = MeanEcho::at_once(detour.power_w(laws, in_phase), range_m);
+        let [power_w, coherent_w] = detour.powers_w(laws, in_phase);
+        let coherent_share = if power_w > 0.0 { coherent_w / power_w } else { 0.0 };
+        let echo = MeanEcho { coherent_share, ..MeanEcho::at_once(power_w, range_m) };
         Bounce { echo, pattern, beside_m }
     }
 
