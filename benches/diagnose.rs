@@ -84,6 +84,7 @@ fn diagnosed(scene: &Path, cloud: &Cloud) -> Result<Report, Failure> {
         cloud,
         antenna: None,
         laws: &ready.laws(),
+        sheets: &ready.sheets,
         declared_effects: model.as_ref().map_or(&[][..], |model| &model.effects),
     };
     Ok(measured.diagnose(0, &library(), &|_| ())?)

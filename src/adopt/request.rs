@@ -220,6 +220,7 @@ impl<'a> CloudRequest<'a> {
             at_other_antenna: self.receiver.is_some(),
             by_range_receiver: false,
             with_bounce: false,
+            with_sheets: false,
         };
         for ready in scenes {
             let (model, scene) = (ready.model(), &ready.scene);
@@ -233,18 +234,20 @@ impl<'a> CloudRequest<'a> {
             measured.ranges &= of_radar.range_sd_m > 0.0;
             measured.by_range_receiver |= scene.radar().receiver.is_some();
             measured.with_bounce |= scene.file.bounce.is_some();
+            measured.with_sheets |= scene.target.transmits();
         }
         let asked =
             if self.effects.is_empty() { library().to_vec() } else { self.effects.to_vec() };
         let choice = Choice::new(&asked, &declared, measured);
         if !self.effects.is_empty() {
             type Refusal = (Reason, fn(String) -> DiagnoseError);
-            let refusals: [Refusal; 5] = [
+            let refusals: [Refusal; 6] = [
                 (Reason::NoTimes, |effects| DiagnoseError::Untimed { effects }),
                 (Reason::NoRanges, |effects| DiagnoseError::Unranged { effects }),
                 (Reason::OtherAntenna, |effects| DiagnoseError::OtherAntenna { effects }),
                 (Reason::RangeReceiver, |effects| DiagnoseError::RangeReceiver { effects }),
                 (Reason::Bounce, |effects| DiagnoseError::Bounce { effects }),
+                (Reason::Sheets, |effects| DiagnoseError::Sheets { effects }),
             ];
             for (reason, refusal) in refusals {
                 let names = choice.left_out(reason);
@@ -315,6 +318,7 @@ impl CheckedRequest<'_> {
                 cloud,
                 antenna: self.antenna,
                 laws,
+                sheets: &ready.sheets,
                 seen_lobe_rad,
                 declared_effects,
             });
@@ -426,10 +430,15 @@ fn check_predicted(scene: &Scene, path: &Path, antenna: Option<Antenna>) -> Resu
         )
     } else if radar.receiver.is_some() && radar.returns != Returns::Strongest {
         ("which of several echoes is not the strongest", "set radar.returns = \"strongest\"")
-    } else if scene.target.transmits() {
+    } else if scene.target.transmits() && (several_paths || radar.receiver.is_some()) {
         (
-            "what lies behind a region that transmits",
-            "replace the sheet by [[effect]] `covering-layer`",
+            "what several rays, a second bounce or a range receiver find behind a region that transmits",
+            "set spot.rays = 1, remove [bounce], and replace [radar.receiver] by [radar.noise]",
+        )
+    } else if scene.target.transmits() && antenna.is_some() {
+        (
+            "what lies behind a region that transmits for an antenna apart from the radar's",
+            "diagnose the radar's own cloud",
         )
     } else if antenna.is_some() && several_paths {
         (

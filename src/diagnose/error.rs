@@ -158,6 +158,15 @@ pub enum DiagnoseError {
         /// Their names.
         effects: String,
     },
+    /// Effects that follow rays to the first surface, and a scene with regions that let them pass on.
+    #[error(
+        "{effects}: that follows rays to the first surface, and regions of the scene let them pass on; remove `transmits` and \
+         `thickness_m` of the regions, or do not ask for {effects}"
+    )]
+    Sheets {
+        /// Their names.
+        effects: String,
+    },
     /// Effects that move the target, and a scene without a range error.
     #[error(
         "the scene states no error of ranges, and {effects} cannot be identified from powers alone; give \

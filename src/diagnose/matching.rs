@@ -1,6 +1,7 @@
 //! A measured cloud against the chirps of its scan: which point is the detection of which chirp.
 
 use std::collections::{HashMap, HashSet};
+use std::ops::Range;
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -58,7 +59,8 @@ pub struct CloudMatch {
     pub alarms: Alarms,
 }
 
-/// Assigns the points of a cloud to the shots of its scan, by chirp numbers or, without them, by directions. Of several
+/// Assigns the points of a cloud to the shots of its scan, by chirp numbers or, without them, by directions. The shots of one chirp
+/// follow each other, and a point is of the one to which it is nearest. Of several
 /// detections of a chirp that reports all, the one nearest to the target is its echo. A detection
 /// farther than 0.1 m from where its chirp meets the target is a stray or, up to 6 dB above the threshold, a false alarm. Its
 /// chirp then counts as silent: an echo is weaker than the false alarm that was reported as the strongest, and unknown
@@ -166,8 +168,10 @@ impl Scan<'_> {
 
     /// Range at which a chirp meets the target, m: half of the way to the antenna.
     fn expected_m(&self, shot: &Shot) -> f64 {
-        self.antenna
-            .map_or(shot.hit.range_m, |antenna| antenna.half_way_m(shot.ray.origin, shot.hit.point))
+        let way_m = self.antenna.map_or(shot.hit.range_m, |antenna| {
+            antenna.half_way_m(shot.ray.origin, shot.hit.point)
+        });
+        way_m + shot.longer_m
     }
 
     /// Distance of a point from where its chirp meets the target: in range and across the ray, m.
@@ -217,27 +221,51 @@ impl Scan<'_> {
         Some(i64::from(own) - i64::from(nearest))
     }
 
-    /// The points of a cloud with their chirps. Where a chirp reports all its detections, those nearest to the target come
-    /// first.
-    fn in_order<'c, 's>(
+    /// The points of a cloud with their chirps, and of the shots of each that to which it is nearest. Where a chirp reports all
+    /// its detections, those nearest to the target come first.
+    fn in_order<'c>(
         &self,
         cloud: &'c Cloud,
         by_number: bool,
-        shot: impl Fn(u32) -> Option<&'s Shot>,
-    ) -> Vec<(&'c CloudPoint, Option<u32>)> {
+        shots: &[Shot],
+        shots_of_chirp: &HashMap<u32, Range<usize>>,
+    ) -> Vec<(&'c CloudPoint, Option<u32>, Option<usize>)> {
         let mut points = Vec::with_capacity(cloud.points().len());
         for point in cloud.points() {
             let chirp = if by_number { point.chirp } else { self.chirp_towards(point.point) };
-            points.push((point, chirp));
+            let own = chirp.and_then(|chirp| shots_of_chirp.get(&chirp)).cloned();
+            let off_m = |index: usize| self.off_m(point, &shots[index]);
+            let nearest = own.into_iter().flatten().min_by(|a, b| off_m(*a).total_cmp(&off_m(*b)));
+            points.push((point, chirp, nearest));
         }
         if self.returns == Returns::All {
-            points.sort_by_cached_key(|(point, chirp)| {
-                let off_m = chirp.and_then(&shot).map_or(0.0, |shot| self.off_m(point, shot));
+            points.sort_by_cached_key(|(point, _, nearest)| {
+                let off_m = nearest.map_or(0.0, |index| self.off_m(point, &shots[index]));
                 // Of distances, which are positive, the bits have the same order.
                 off_m.to_bits()
             });
         }
         points
+    }
+
+    /// States what the echoes of one chirp stayed below because of the one that was reported: below it where that is the
+    /// strongest, and anything behind it where that is the first.
+    fn limit_others(&self, shots: &[Shot], observations: &mut [Observation]) {
+        let Some(reported) = observations.iter().position(|one| one.power_w.is_some()) else {
+            return;
+        };
+        let behind_m = self.expected_m(&shots[reported]);
+        let limit_w = match self.returns {
+            Returns::Strongest => observations[reported].power_w,
+            Returns::First => Some(NO_LIMIT_W),
+            Returns::All => None,
+        };
+        for (shot, other) in shots.iter().zip(observations) {
+            let is_hidden = self.returns == Returns::Strongest || self.expected_m(shot) > behind_m;
+            if other.power_w.is_none() && is_hidden {
+                other.limit_w = limit_w.or(other.limit_w);
+            }
+        }
     }
 
     /// The highest power of a false alarm, W.
@@ -256,8 +284,10 @@ impl Scan<'_> {
     /// Assigns points to chirps by their numbers or by their directions. A stray still counts for the target
     /// where it lies on its chirp's ray and near where other chirps meet the target: a wide spot sees past the edge.
     fn assign(&self, cloud: &Cloud, shots: &[Shot], by_number: bool) -> Assignment {
-        let shot_of_chirp: HashMap<u32, usize> =
-            shots.iter().enumerate().map(|(index, shot)| (shot.chirp, index)).collect();
+        let mut shots_of_chirp: HashMap<u32, Range<usize>> = HashMap::new();
+        for (index, shot) in shots.iter().enumerate() {
+            shots_of_chirp.entry(shot.chirp).or_insert(index..index).end = index + 1;
+        }
         let progress = self.chirps.progress();
         let places: Vec<DVec3> = shots.iter().map(|shot| shot.hit.point.xyz).collect();
         let target = Nearest::new(&places);
@@ -266,11 +296,8 @@ impl Scan<'_> {
         let (mut past_the_edge, mut chirps_with_points) = (HashSet::new(), HashSet::new());
         let mut spoke = HashSet::new();
         let mut alarms = Alarms { weight: 1.0, returns: self.returns, ..Alarms::default() };
-        for (point, chirp) in self.in_order(cloud, by_number, |chirp| {
-            shot_of_chirp.get(&chirp).and_then(|index| shots.get(*index))
-        }) {
+        for (point, chirp, index) in self.in_order(cloud, by_number, shots, &shots_of_chirp) {
             chirps_with_points.extend(chirp);
-            let index = chirp.and_then(|chirp| shot_of_chirp.get(&chirp).copied());
             if let Some((shot, observation)) =
                 index.and_then(|index| Some((shots.get(index)?, observations.get_mut(index)?)))
             {
@@ -288,12 +315,16 @@ impl Scan<'_> {
                 } else if (!is_near || self.returns == Returns::All)
                     && self.is_alarm(point, shot, &mut spoke)
                 {
-                    match self.returns {
-                        Returns::Strongest if is_first => observation.limit_w = Some(point.power_w),
-                        Returns::First if is_first && range_m < self.expected_m(shot) => {
-                            observation.limit_w = Some(NO_LIMIT_W);
+                    let own = shots_of_chirp.get(&shot.chirp).cloned().unwrap_or_default();
+                    for (shot, one) in shots[own.clone()].iter().zip(&mut observations[own]) {
+                        let is_open = one.power_w.is_none();
+                        match self.returns {
+                            Returns::Strongest if is_open => one.limit_w = Some(point.power_w),
+                            Returns::First if is_open && range_m < self.expected_m(shot) => {
+                                one.limit_w = Some(NO_LIMIT_W);
+                            }
+                            _ => {}
                         }
-                        _ => {}
                     }
                     if self.returns == Returns::First {
                         alarms.of_target += 1;
@@ -323,9 +354,12 @@ impl Scan<'_> {
                 strays.push(Stray { shot, range_m });
             }
         }
+        for own in shots_of_chirp.values().filter(|own| own.len() > 1) {
+            self.limit_others(&shots[own.clone()], &mut observations[own.clone()]);
+        }
         let rays = self.chirps.rays.iter().zip(&self.chirps.number);
         let (missing, numbers): (Vec<&Ray<Global>>, Vec<&u32>) =
-            rays.filter(|(_, number)| !shot_of_chirp.contains_key(*number)).unzip();
+            rays.filter(|(_, number)| !shots_of_chirp.contains_key(*number)).unzip();
         let spoke_not = numbers.into_iter().filter(|number| !chirps_with_points.contains(*number));
         alarms.silent_misses = spoke_not.count();
         alarms.silent = match self.returns {

@@ -11,7 +11,7 @@
 //! | step | file |
 //! |---|---|
 //! | from a scene and its cloud to a report | `scan.rs`, `run.rs` |
-//! | every chirp against the target, the cloud against the chirps | `shots.rs`, `matching.rs` |
+//! | every chirp against the target, the cloud against the chirps | `shots.rs`, `unresolved.rs`, `matching.rs` |
 //! | probability of the observations | `likelihood.rs`, `problem.rs`, `shared.rs` |
 //! | several clouds of one target | `views.rs`, `in_scans.rs`, `clouds.rs`, `contradiction.rs` |
 //! | scattering models and effects together | `space.rs`, `refit.rs`, `optima.rs`, `ranges.rs` |
@@ -68,6 +68,7 @@ mod support;
 #[cfg(test)]
 mod tests;
 mod trial;
+mod unresolved;
 mod views;
 
 pub use alarms::{Alarms, FalseAlarms};

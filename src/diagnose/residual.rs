@@ -154,10 +154,11 @@ impl Neighbours<'_> {
         let (mut sums, mut counts) = ([0.0; RINGS], [0.0; RINGS]);
         for (di, dj) in (-1..=1).flat_map(|di| (-1..=1).map(move |dj| (di, dj))) {
             for &other in self.members.get(&[i + di, j + dj]).into_iter().flatten() {
-                let Shot { xt_m, yt_m, scan, .. } = self.shots[other];
+                let Shot { xt_m, yt_m, scan, sheets, .. } = self.shots[other];
                 let beyond_m = (xt_m - shot.xt_m).hypot(yt_m - shot.yt_m) - self.from_m;
                 let ring = (beyond_m / self.spot_m).floor();
-                if ring >= 0.0 && ring < RINGS as f64 && scan == shot.scan {
+                let is_alike = (scan, sheets) == (shot.scan, shot.sheets);
+                if is_alike && ring >= 0.0 && ring < RINGS as f64 {
                     let ring = ring as usize;
                     counts[ring] += 1.0;
                     if other > index {

@@ -7,12 +7,14 @@ use super::matching::match_cloud;
 use super::observation::ReceiverLimits;
 use super::report::{MeshPose, Report};
 use super::settings::Diagnosis;
-use super::shots::trace_shots;
+use super::shots::{trace_layers, trace_shots};
 use super::subject::Subject;
+use super::unresolved::Unresolved;
 use crate::brdf::Brdf;
-use crate::effects::{Antenna, Effect, MOST_LOOKS, Receiver, Stage, middle};
+use crate::effects::{Antenna, Effect, MOST_LOOKS, Receiver, Shot, Stage, middle};
 use crate::measure::Cloud;
 use crate::radar::{Link, Radar, RadarError, RangeProcessor};
+use crate::render::{Setup, Sheet, Surface};
 use crate::scene::Scene;
 use crate::trace::{Bvh, ScanGeometry};
 use crate::units::watts_from_dbm;
@@ -28,6 +30,8 @@ pub struct MeasuredScene<'a> {
     pub antenna: Option<Antenna>,
     /// Scattering model of each region, where the refit begins.
     pub laws: &'a [Brdf],
+    /// The sheet of each region that lets a part of the wave through; none of any other, and beyond the last.
+    pub sheets: &'a [Option<Sheet>],
     /// Width of the narrowest lobe of a region whose lobes include the beam that saw them, rad.
     pub seen_lobe_rad: &'a [Option<f64>],
     /// Effects that the scene declares, at fixed values.
@@ -68,7 +72,7 @@ pub fn diagnose_together(
     let grains: Vec<Vec<DVec3>> =
         targets.map(|target| target.regions.iter().map(|region| region.grain).collect()).collect();
     let (receiver, declared) = declared_receiver(first.scene.radar())?;
-    let (mut stages, mut shots) = (Vec::new(), Vec::new());
+    let (mut stages, mut shots, mut unresolved) = (Vec::new(), Vec::new(), Vec::new());
     let (mut observations, mut strays, mut alarms) = (Vec::new(), Vec::new(), Vec::new());
     for (number, one) in measured.iter().enumerate() {
         if one.received()? != first.received()? {
@@ -87,7 +91,7 @@ pub fn diagnose_together(
             antenna,
             middle: DVec3::ZERO,
         };
-        let mut own = trace_shots(&stage)?;
+        let (mut own, parts) = one.echoes(&stage)?;
         stage.middle = middle(&own);
         // The cloud against the chirps.
         let ReceiverLimits { threshold_w, .. } = declared;
@@ -99,11 +103,21 @@ pub fn diagnose_together(
         own.iter_mut().chain(of_strays).for_each(|shot| shot.scan = number as u16);
         stages.push(stage);
         shots.extend(own);
+        unresolved.push(parts);
         observations.extend(matched.observations);
         strays.push(matched.strays);
         alarms.push(matched.alarms);
     }
-    let at_work: Vec<_> = measured.iter().map(|one| one.declared_effects).collect();
+    let at_work: Vec<Vec<(&dyn Effect, Vec<f64>)>> = std::iter::zip(measured, &unresolved)
+        .map(|(one, unresolved)| {
+            let mut effects = one.declared_effects.to_vec();
+            if !unresolved.is_empty() {
+                effects.push((unresolved, Vec::new()));
+            }
+            effects
+        })
+        .collect();
+    let at_work: Vec<_> = at_work.iter().map(Vec::as_slice).collect();
     let subject = Subject {
         stages: &stages,
         laws: first.laws,
@@ -122,6 +136,24 @@ pub fn diagnose_together(
 }
 
 impl MeasuredScene<'_> {
+    /// The shots of the scan's chirps, and what else their echoes hold where surfaces are sheets.
+    fn echoes(&self, stage: &Stage) -> Result<(Vec<Shot>, Unresolved), DiagnoseError> {
+        if self.sheets.iter().all(Option::is_none) {
+            return Ok((trace_shots(stage)?, Unresolved::default()));
+        }
+        let regions = self.scene.target.regions.iter().zip(self.laws).enumerate();
+        let surfaces = regions.map(|(number, (region, law))| {
+            let seen_lobe_rad = self.seen_lobe_rad.get(number).copied().flatten();
+            let opaque = Surface { seen_lobe_rad, ..Surface::new(law) };
+            let sheet = self.sheets.get(number).and_then(Option::as_ref);
+            Surface { grain: region.grain, ..sheet.map_or(opaque, Surface::of_sheet) }
+        });
+        let surfaces: Vec<Surface> = surfaces.collect();
+        let most_sheets = self.scene.file.transmission.sheets;
+        let setup = Setup { most_sheets, ..Setup::new(stage.geometry, &surfaces) };
+        trace_layers(stage, &setup, self.laws)
+    }
+
     /// The receiver with the declared effects on it, and its limits.
     fn received(&self) -> Result<(Receiver, ReceiverLimits), RadarError> {
         let (receiver, limits) = declared_receiver(self.scene.radar())?;

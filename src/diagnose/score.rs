@@ -174,8 +174,7 @@ fn detected_moments(
         let passed = prediction.saturating.of(ln_mean.max(ln_threshold - FARTHEST));
         let from = (ln_threshold - passed.ln_mean) / passed.slope;
         let is_tabulated = looks == prediction.receiver.looks;
-        let [mean, variance] =
-            if is_tabulated { table.at(from) } else { moments(looks, from) };
+        let [mean, variance] = if is_tabulated { table.at(from) } else { moments(looks, from) };
         let variance = passed.slope * passed.slope * variance;
         let chance = if weight == 1.0 { 1.0 } else { likelihood.chance(&one) };
         let (mean, weight) = (passed.ln_mean + passed.slope * mean, weight * chance.max(1e-300));

@@ -81,10 +81,15 @@ impl Neighbours<'_> {
         let squares = (-1..=1).flat_map(move |di| (-1..=1).map(move |dj| [i + di, j + dj]));
         squares
             .flat_map(|square| self.members.get(&square).into_iter().flatten())
-            .filter(move |&&other| other != index && self.shots[other].scan == shot.scan)
+            .filter(move |&&other| other != index && is_one_field(&self.shots[other], shot))
             .map(|&other| (other, distance_m(shot, &self.shots[other])))
             .filter(|(_, apart_m)| *apart_m < self.farthest_m)
     }
+}
+
+/// Whether two shots see one field of speckle: that behind other sheets is another one.
+fn is_one_field(a: &Shot, b: &Shot) -> bool {
+    (a.scan, a.sheets) == (b.scan, b.sheets)
 }
 
 fn distance_m(a: &Shot, b: &Shot) -> f64 {

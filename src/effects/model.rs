@@ -92,7 +92,7 @@ impl Intersection {
 
     /// Range of its echo, m.
     fn range_m(&self) -> f64 {
-        self.way_back.map_or(self.shot.hit.range_m, |way| way.range_m)
+        self.way_back.map_or(self.shot.hit.range_m, |way| way.range_m) + self.shot.longer_m
     }
 }
 
@@ -178,9 +178,8 @@ impl Model<'_> {
         let intersections = cache.intersections.get_or_make(moving.clone(), make);
         // f of the scattering models and the gains, in caches of their own, since they depend on different values.
         let key = (self.laws.clone(), moving);
-        let coherent = cache
-            .coherent
-            .get_or_make(key.clone(), || self.coherent_shares(stage, &intersections));
+        let coherent =
+            cache.coherent.get_or_make(key.clone(), || self.coherent_shares(stage, &intersections));
         let f_per_sr = cache.scattered.get_or_make(key, || {
             let laws = self.retros();
             let tasks = intersections.par_chunks(SHOTS_PER_TASK);
@@ -428,7 +427,8 @@ impl Model<'_> {
             return stage.link.flux_w(shot.hit.cos_theta) * f_per_sr * way.projected_sr;
         }
         let beam = stage.beam(shot);
-        stage.link.power_w(&beam, shot.hit.range_m, shot.hit.cos_theta, f_per_sr)
+        let power_w = stage.link.power_w(&beam, shot.hit.range_m, shot.hit.cos_theta, f_per_sr);
+        shot.by_sheets * power_w
     }
 
     /// The products of all gains of some shots; 0 of a shot that misses.

@@ -75,7 +75,8 @@ mod tests {
     fn a_wave_beside_speckle_narrows_it_as_draws_do() {
         const COUNT: usize = 100_000;
         for (looks, share) in [(1, 0.0), (1, 0.5), (1, 0.9), (4, 0.3), (4, 0.7)] {
-            let mut draws = Key { seed: 6, chirp: 0, sub_ray: 0, purpose: Purpose::Speckle }.draws();
+            let mut draws =
+                Key { seed: 6, chirp: 0, sub_ray: 0, purpose: Purpose::Speckle }.draws();
             let mut one = || {
                 let waves = (0..looks).map(|_| {
                     let field = draws.complex_gaussian() * f64::sqrt(1.0 - share);

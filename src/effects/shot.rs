@@ -41,6 +41,13 @@ pub struct Shot {
     pub yt_m: f64,
     /// Distance in the target plane to the nearest edge in depth, m, at most three spots.
     pub edge_m: f64,
+    /// Number of sheets in front of the hit.
+    pub sheets: u8,
+    /// Factor on the power of the echo by sheets: by those in front, and of a sheet by what the radar's sweep reads of it over
+    /// what its law says.
+    pub by_sheets: f64,
+    /// What these seem to add to the range, m.
+    pub longer_m: f64,
 }
 
 impl Shot {
@@ -62,6 +69,9 @@ impl Shot {
             xt_m: 0.0,
             yt_m: 0.0,
             edge_m: 0.0,
+            sheets: 0,
+            by_sheets: 1.0,
+            longer_m: 0.0,
         }
     }
 

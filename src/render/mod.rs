@@ -10,7 +10,7 @@
 //! | … with declared physical effects | `effect_scan.rs` |
 //! | the wave of a mirror that the spot reaches beyond | `coherent.rs` |
 //! | speckle, a field fixed to the surface | `speckle/` |
-//! | echoes that part in range | `returns.rs` |
+//! | echoes that part in range | `returns.rs`, `layers.rs` |
 //! | how far the target tilts within the spots | `curvature.rs` |
 //! | how far neighbouring facets turn | `facet_steps.rs` |
 //! | detection by the receiver, and the cause of each echo | `detect.rs`, `echo.rs` |
@@ -31,6 +31,7 @@ mod edges;
 mod error;
 mod facet_steps;
 mod image;
+mod layers;
 mod observer;
 mod path;
 mod paths;
@@ -52,6 +53,7 @@ pub use echo::{Echo, Truth};
 pub use error::RenderError;
 pub use facet_steps::facet_steps;
 pub use image::{CHANNELS, power_image};
+pub(crate) use layers::{Layer, layers};
 pub use observer::Observer;
 pub use scan::{Scan, beat_signals, shade, trace, trace_placed};
 pub use setup::{MOST_SHEETS, Setup};

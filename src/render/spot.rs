@@ -54,6 +54,12 @@ pub struct Behind {
 }
 
 impl Footprints {
+    /// Distance of every chirp from an edge in depth of what lies behind so many sheets, m.
+    pub(super) fn edge_m_behind(&self, sheets: u8) -> &[f64] {
+        let behind = usize::from(sheets).checked_sub(1).and_then(|layer| self.behind.get(layer));
+        behind.map_or(&self.edge_m, |behind| &behind.edge_m)
+    }
+
     /// The hits of each chirp.
     pub fn chirps(&self) -> impl IndexedParallelIterator<Item = &[Option<Hit>]> {
         self.hits.par_chunks(self.rays_per_chirp.max(1))

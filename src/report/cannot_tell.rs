@@ -107,6 +107,7 @@ fn would_help(error: &DiagnoseError) -> &'static str {
             "A scene whose [radar.receiver] is the one that measured."
         }
         DiagnoseError::Bounce { .. } => "A scene without [bounce].",
+        DiagnoseError::Sheets { .. } => "A scene whose regions let nothing pass.",
         DiagnoseError::Unranged { .. } => {
             "Ranges, and their standard deviation as `range_sd_m` under [radar.noise] in the scene."
         }

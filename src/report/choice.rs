@@ -22,6 +22,8 @@ pub enum Reason {
     RangeReceiver,
     /// It moves the target, and the scene has second-order paths, which are followed where the scene has the target.
     Bounce,
+    /// It follows rays to the first surface, and regions of the scene let them pass on.
+    Sheets,
     /// The user named other effects.
     NotAsked,
 }
@@ -39,6 +41,9 @@ impl Reason {
             Reason::RangeReceiver => "a range receiver has its own speckle and noise",
             Reason::Bounce => {
                 "they move the target, and [bounce] follows paths on it where the scene has it"
+            }
+            Reason::Sheets => {
+                "they follow rays to the first surface, and regions of the scene let them pass on"
             }
             Reason::NotAsked => "others were asked for",
         }
@@ -79,6 +84,8 @@ pub struct Measurands {
     pub by_range_receiver: bool,
     /// Whether the scene has second-order paths.
     pub with_bounce: bool,
+    /// Whether regions of the scene let a part of the wave through.
+    pub with_sheets: bool,
 }
 
 /// The library of effects, sorted for one scan.
@@ -122,6 +129,7 @@ impl Choice {
             Reason::OtherAntenna,
             Reason::RangeReceiver,
             Reason::Bounce,
+            Reason::Sheets,
             Reason::NoTimes,
             Reason::NoRanges,
         ] {
@@ -151,6 +159,8 @@ fn reason_against(
         Some(Reason::RangeReceiver)
     } else if measured.with_bounce && about.is_excluded_by(Setting::Bounce) {
         Some(Reason::Bounce)
+    } else if measured.with_sheets && about.is_excluded_by(Setting::Sheets) {
+        Some(Reason::Sheets)
     } else if !measured.times && effect.depends_on_time() {
         Some(Reason::NoTimes)
     } else if !measured.ranges && effect.moves() {
@@ -185,6 +195,7 @@ mod tests {
             at_other_antenna: false,
             by_range_receiver: false,
             with_bounce: false,
+            with_sheets: false,
         };
         let choice = Choice::new(&asked, &["pose"], Measurands { ranges: false, ..all });
         assert_eq!(choice.left_out(Reason::NoRanges), ["motion"]);
@@ -200,5 +211,9 @@ mod tests {
         let bounced = Measurands { with_bounce: true, ..all };
         let choice = Choice::new(&library(), &["multi-bounce"], bounced);
         assert_eq!(choice.left_out(Reason::Bounce), ["pose", "motion"]);
+        let behind = Measurands { with_sheets: true, ..all };
+        let choice = Choice::new(&library(), &[], behind);
+        let first_surface = ["pose", "motion", "finite-spot", "multi-bounce"];
+        assert_eq!(choice.left_out(Reason::Sheets), first_surface);
     }
 }
