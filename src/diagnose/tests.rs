@@ -405,8 +405,10 @@ fn a_target_that_turns_while_it_is_scanned_has_moved() {
     let names: Vec<&str> = report.effects.iter().map(|e| e.name).collect();
     assert_eq!(names, ["motion"], "{report:#?}");
     for (name, by) in truth {
+        // Facets and edges may leave a turn without a standard deviation; it is found all the same.
         let Value { value, sd, .. } = report.effects[0].parameters[name];
-        assert!((value - by).abs() < 4.0 * sd.unwrap(), "{name}: {value} for {by}, {sd:?}");
+        let most_off = sd.map_or(0.25 * by.abs(), |sd| 4.0 * sd);
+        assert!((value - by).abs() < most_off, "{name}: {value} for {by}, {sd:?}");
     }
     assert!(report.error.after.rmse_db < 1.05 * report.error.after.noise_floor_db);
 }

@@ -515,12 +515,17 @@ mod tests {
                 let gains = [far, &start].map(|at| screen.gain(&first.space, at));
                 assert!(gains[0] >= gains[1] - 1e-9, "{gains:?}");
             }
-            // Beside an effect only laws that the data leave open are.
+            // Beside an effect only laws that the data leave open are; others stay where they are, and an effect that promises
+            // nothing there is followed from where they fit it best.
             let with = base.space.with(&BOWL);
             let start = Space::joined(&base.fit.at, &BOWL, &[-6.0]);
             let fit = search.scorer.problem.fit(&with, &start, &[], &SEARCH);
             let with = search.scorer.state(with, fit);
-            assert_eq!(trial(search, &with).has_far_start, search.screen(&with).leaves_laws_open);
+            assert!(!search.screen(&with).leaves_laws_open);
+            let beside = trial(search, &with);
+            assert!(beside.has_far_start && beside.candidate.gain < settings.least_gain);
+            let far = &beside.starts.last().unwrap().at;
+            assert!((far.rows(0, laws) - with.fit.at.rows(0, laws)).norm() < 0.05);
         });
     }
 }
