@@ -164,9 +164,12 @@ fn data_that_leave_every_number_at_a_bound_are_told_so() {
 fn a_fit_that_did_not_converge_is_printed_and_not_stored() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    fs::write(folder.join("scan.csv"), curve(0.0, 60.0, 400)).unwrap();
-    // A single lobe for two: the looks have to explain the tail, slowly.
-    let fit = ["fit", "scan.csv", "--model", "cook-torrance", "--starts", "1", "-o", "fit.svg"];
+    // Levels without any order, for which least squares finds no way on.
+    let rows = "6,-25 11,-30 19,-17 20,-6 22,-25 37,-37 50,-27 50,-46 52,-21 64,-36 67,-46 67,-55";
+    let rows = rows.split(' ').fold("theta_deg,sigma0_db".to_owned(), |all, row| all + "\n" + row);
+    fs::write(folder.join("scan.csv"), rows).unwrap();
+    let model = ["--model", "kirchhoff-go", "--method", "tls", "--starts", "1"];
+    let fit = [&["fit", "scan.csv", "-o", "fit.svg"][..], &model].concat();
     let output = matdb(folder).args(fit).args(SAVE).output().unwrap();
     let [out, error] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
     assert_eq!(output.status.code(), Some(1), "{out}");

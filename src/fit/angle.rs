@@ -19,16 +19,24 @@ const MOST_NODES: usize = 96;
 /// Nodes reach this many s to either side of the measured angle.
 const REACH: f64 = 4.0;
 
-/// True angles, rad, and their weights, which sum to 1; the measured angle alone where it is exact. The nodes are
-/// `coarseness` times as far apart as they should be, 1 or more.
-pub(super) fn true_angles(theta_rad: f64, sd_rad: f64, coarseness: f64) -> Vec<(f64, f64)> {
+/// True angles, rad, and their weights, which sum to 1; the measured angle alone where it is exact.
+pub(super) fn true_angles(theta_rad: f64, sd_rad: f64) -> Vec<(f64, f64)> {
+    let low = (theta_rad - REACH * sd_rad).max(0.0);
+    nodes(theta_rad, sd_rad, (sd_rad / 3.0).min(APART_RAD + APART_SHARE * low))
+}
+
+/// The same for a likelihood that only ranks laws: one standard deviation apart.
+pub(super) fn coarse_angles(theta_rad: f64, sd_rad: f64) -> Vec<(f64, f64)> {
+    nodes(theta_rad, sd_rad, sd_rad)
+}
+
+fn nodes(theta_rad: f64, sd_rad: f64, apart_rad: f64) -> Vec<(f64, f64)> {
     if sd_rad <= 0.0 {
         return vec![(theta_rad, 1.0)];
     }
     let low = (theta_rad - REACH * sd_rad).max(0.0);
     let reach = theta_rad + REACH * sd_rad - low;
-    let apart = coarseness * (sd_rad / 3.0).min(APART_RAD + APART_SHARE * low);
-    let count = ((reach / apart).ceil() as usize).clamp(1, MOST_NODES);
+    let count = ((reach / apart_rad).ceil() as usize).clamp(1, MOST_NODES);
     let width = reach / count as f64;
     let mut nodes = Vec::with_capacity(count);
     for index in 0..count {
@@ -91,7 +99,7 @@ mod tests {
         let lobe = |t: f64| (-(t / 0.05).powi(2)).exp();
         for (theta, sd) in [(0.0, 0.02), (0.01, 0.035), (0.05, 0.02), (0.1, 0.035)] {
             let quadrature: f64 =
-                true_angles(theta, sd, 1.0).iter().map(|(t, weight)| weight * lobe(*t)).sum();
+                true_angles(theta, sd).iter().map(|(t, weight)| weight * lobe(*t)).sum();
             // Gaussian times Gaussian, in closed form: w = 1/(1 + 2s²/m²), w·exp(−wθ²/m²).
             let w = 1.0 / (1.0 + 2.0 * (sd / 0.05f64).powi(2));
             let exact = w * (-w * (theta / 0.05f64).powi(2)).exp();
@@ -107,7 +115,7 @@ mod tests {
         let (theta, sd) = (0.1, 3f64.to_radians());
         for centre in [0.07, 0.0712, 0.0725, 0.0737, 0.12] {
             let bell = |t: f64| (-0.5 * ((t - centre) / BELL_RAD).powi(2)).exp();
-            let found: f64 = true_angles(theta, sd, 1.0).iter().map(|(t, w)| w * bell(*t)).sum();
+            let found: f64 = true_angles(theta, sd).iter().map(|(t, w)| w * bell(*t)).sum();
             let dense = (0..40_000).map(|i| (f64::from(i) + 0.5) * 1e-5);
             let exact: f64 = dense.map(|t| rice(t / sd, theta / sd) / sd * bell(t) * 1e-5).sum();
             // The bell is about as wide as the nodes are apart.
@@ -117,13 +125,13 @@ mod tests {
 
     #[test]
     fn at_normal_incidence_the_angle_is_rayleighs() {
-        let mean: f64 = true_angles(0.0, 0.02, 1.0).iter().map(|(t, weight)| t * weight).sum();
+        let mean: f64 = true_angles(0.0, 0.02).iter().map(|(t, weight)| t * weight).sum();
         // Nodes a third of s apart, where the density begins with a kink.
         assert!((mean / 0.02 / (std::f64::consts::PI / 2.0).sqrt() - 1.0).abs() < 5e-3, "{mean}");
     }
 
     #[test]
     fn an_exact_angle_is_one_node() {
-        assert_eq!(true_angles(0.3, 0.0, 1.0), [(0.3, 1.0)]);
+        assert_eq!(true_angles(0.3, 0.0), [(0.3, 1.0)]);
     }
 }

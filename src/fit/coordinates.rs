@@ -17,8 +17,8 @@ pub(crate) const SPECULAR_LEVEL: &str = "S";
 pub(crate) const DIFFUSE_LEVEL: &str = "R";
 /// Name of the looks of the speckle.
 pub(crate) const LOOKS: &str = "looks";
-/// Range of the levels: 10⁻⁹ is 60 dB below the weakest detection.
-const LEVEL_RANGE: (f64, f64) = (1e-9, 1.0);
+/// Range of the levels: a lobe of m = 0.001 is a million times its level, and 10⁻¹² is then 60 dB below a mirror.
+const LEVEL_RANGE: (f64, f64) = (1e-12, 1.0);
 /// Range of the looks: from far stronger than fully developed speckle to practically no speckle.
 const LOOKS_RANGE: (f64, f64) = (0.1, 1e4);
 

@@ -93,6 +93,8 @@ const MOST_TAILS: usize = 16;
 const FIRST: f64 = -14.0;
 const STEP: f64 = 1.0 / 32.0;
 const KNOTS: usize = 608;
+/// ln(limit/mean) times the narrowness from which the power stays below the limit but for a share of 10⁻¹⁵ or less.
+const SURE: f64 = 8.0;
 /// Step in ln L for the derivative by L.
 const LOOKS_STEP: f64 = 1e-4;
 
@@ -140,6 +142,9 @@ impl GammaLaw {
     /// ln probability that the power stays below a limit.
     pub fn below(&self, ln_limit: f64, ln_mean: f64) -> LnProbability {
         let ln_ratio = ln_limit - ln_mean;
+        if ln_ratio * self.narrowness > SURE {
+            return LnProbability::default();
+        }
         let x = (ln_ratio * self.narrowness - FIRST) / STEP;
         let inside = (1.0..(KNOTS - 3) as f64).contains(&x);
         let Some(tail) = self.below.as_ref().filter(|_| inside) else {

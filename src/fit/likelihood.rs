@@ -10,7 +10,7 @@
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::angle::true_angles;
+use super::angle::{coarse_angles, true_angles};
 use super::coordinates::Coordinates;
 use super::gamma_law::{GammaLaw, LnProbability};
 use super::minimise::Local;
@@ -20,8 +20,6 @@ use crate::material::Observation;
 
 /// Rows that one task sums, fixed so that the sum is the same on any number of threads.
 const CHUNK: usize = 256;
-/// How much farther apart than usual the true angles of coarse rows are: one standard deviation of the error.
-const COARSENESS: f64 = 3.0;
 
 /// Which curvature a search uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,6 +41,9 @@ pub(super) struct Likelihood<'a> {
     /// True angles of all rows without a detection.
     limits: usize,
 }
+
+/// True angles, rad, with their weights, of a measured angle and its standard deviation, both in rad.
+type AnglesOfRow = fn(f64, f64) -> Vec<(f64, f64)>;
 
 /// One row; its power is in units of σ⁰.
 #[derive(Clone, Debug)]
@@ -81,7 +82,7 @@ impl Tables {
 impl<'a> Likelihood<'a> {
     /// Prepares the rows; `noise_w` is the mean thermal power in each.
     pub fn new(coordinates: &'a Coordinates, rows: &[Observation], noise_w: f64) -> Likelihood<'a> {
-        Likelihood::of_nodes(coordinates, rows, noise_w, 1.0)
+        Likelihood::of_nodes(coordinates, rows, noise_w, true_angles)
     }
 
     /// The same with true angles that are so coarse that it only ranks laws.
@@ -90,17 +91,17 @@ impl<'a> Likelihood<'a> {
         rows: &[Observation],
         noise_w: f64,
     ) -> Likelihood<'a> {
-        Likelihood::of_nodes(coordinates, rows, noise_w, COARSENESS)
+        Likelihood::of_nodes(coordinates, rows, noise_w, coarse_angles)
     }
 
     fn of_nodes(
         coordinates: &'a Coordinates,
         rows: &[Observation],
         noise_w: f64,
-        coarseness: f64,
+        angles: AnglesOfRow,
     ) -> Likelihood<'a> {
         let mut chirps: Vec<Chirp> =
-            rows.iter().map(|row| Chirp::new(row, noise_w, coarseness)).collect();
+            rows.iter().map(|row| Chirp::new(row, noise_w, angles)).collect();
         let limits = chirps.iter().filter(|chirp| chirp.censored).map(|c| c.nodes.len()).sum();
         let theta_rad: Vec<f64> =
             chirps.iter().flat_map(|c| &c.nodes).map(|n| n.theta_rad).collect();
@@ -206,9 +207,9 @@ impl Scratch {
 
 impl Chirp {
     /// Prepares a row that has a σ⁰ or a limit.
-    fn new(row: &Observation, noise_w: f64, coarseness: f64) -> Chirp {
+    fn new(row: &Observation, noise_w: f64, angles: AnglesOfRow) -> Chirp {
         let sigma0 = row.level_sigma0().unwrap_or(f64::NAN);
-        let angles = true_angles(row.theta_i_rad, row.theta_sd_rad.unwrap_or(0.0), coarseness);
+        let angles = angles(row.theta_i_rad, row.theta_sd_rad.unwrap_or(0.0));
         let node = |(theta_rad, weight): (f64, f64)| Node {
             theta_rad,
             place: Place::new(theta_rad),

@@ -23,16 +23,18 @@ use crate::material::Observation;
 const PLACES: [usize; 4] = [1, 64, 512, 2048];
 /// Search of the amplitudes at one place; it only has to rank the places.
 const LEVELS: Minimise = Minimise { iterations: 8, tolerance: 0.1, patience: 3 };
-/// ln of an amplitude's least share of its largest value.
-const LEAST_LN: f64 = -25.0;
+/// ln of an amplitude's least share of its largest value, 10⁻¹².
+const LEAST_LN: f64 = -28.0;
 /// How far below its own best each other amplitude is, where one starts as the whole law, in ln.
 const BELOW: f64 = 5.0;
 /// Looks that are tried at each place lie this factor apart.
 const LOOKS_APART: f64 = 2.5;
 /// How often amplitudes and looks are searched in turn.
 const TURNS: usize = 2;
-/// Places from which a short search follows, for each start that is wanted.
-const FOLLOWED: usize = 8;
+/// Places from which a short search follows, in all and for each start that is wanted. Of two optima the one with the
+/// narrower valley may have its first place behind twenty of the other.
+const FOLLOWED: usize = 32;
+const FOLLOWED_EACH: usize = 8;
 /// That search: it only has to rank their optima.
 const SHORT: Minimise = Minimise { iterations: 15, tolerance: 0.1, patience: 6 };
 /// Halvings of the range in which the number of an amplitude is sought.
@@ -95,7 +97,7 @@ impl<'a> Projection<'a> {
         let usual: Vec<[f64; 2]> = self.coordinates.list.iter().map(|c| c.usual_ends()).collect();
         let shapes = &self.parts.shapes;
         let costs = tried.iter().map(|(cost, at, _)| (*cost, at.clone())).collect();
-        let places = apart(costs, shapes, &usual, FOLLOWED * count);
+        let places = apart(costs, shapes, &usual, FOLLOWED.max(FOLLOWED_EACH * count));
         let ends = places.into_par_iter().filter_map(|place| {
             let (_, at, best) = tried.iter().find(|(_, at, _)| *at == place)?;
             let start = self.start(at, best);

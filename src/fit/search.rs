@@ -102,42 +102,46 @@ impl Fit {
         SearchResult { best, agreeing, uncertainty, profiles }
     }
 
-    /// The most likely end of all searches, and how many of them reached it. The starts come from two halves of the
-    /// shapes, the given one with the second. Where the halves do not end alike, more shapes are tried.
+    /// The most likely end of all searches, one that converged if any did, and how many of them reached it. The starts
+    /// come from two halves of the shapes, the given one with the second. Where the halves do not end alike, more shapes
+    /// are tried.
     fn likeliest(
         &self,
         coordinates: &Coordinates,
         rows: &[Observation],
         likelihood: &Likelihood,
     ) -> (Minimum, usize) {
-        let mut best = search_from(coordinates, likelihood, &coordinates.start());
-        let mut costs = vec![best.local.value];
+        let own = search_from(coordinates, likelihood, &coordinates.start());
         if self.starts == 1 {
-            return (best, 1);
+            return (own, 1);
         }
+        let mut least = [f64::INFINITY, own.local.value];
+        let mut ends = vec![own];
         let projection = Projection::new(coordinates, rows, self.noise_w.unwrap_or(0.0));
         let counts = [self.starts / 2, (self.starts - 1) / 2].map(|count| count.max(1));
-        let mut least = [f64::INFINITY, best.local.value];
         for factor in MORE_SHAPES {
             for half in 0..2 {
                 for start in projection.starts(half, factor, counts[half]) {
-                    let found = search_from(coordinates, likelihood, &start);
-                    let value = found.local.value;
-                    costs.push(value);
-                    least[half] = least[half].min(value);
-                    if value < best.local.value || !best.local.value.is_finite() {
-                        best = found;
-                    }
+                    let end = search_from(coordinates, likelihood, &start);
+                    least[half] = least[half].min(end.local.value);
+                    ends.push(end);
                 }
             }
             if (least[0] - least[1]).abs() <= ALIKE {
                 break;
             }
         }
+        let metals: Vec<DVector<f64>> =
+            ends.iter().filter_map(|end| metal(coordinates, &end.at)).collect();
+        ends.extend(metals.iter().map(|at| search_from(coordinates, likelihood, at)));
+        ends.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
+        let limit = rank(&ends[0]) + SAME;
+        let agreeing = ends.iter().filter(|end| rank(end) <= limit).count();
+        let arrived = ends.iter().take(agreeing).position(Minimum::converged);
+        let mut best = ends.swap_remove(arrived.unwrap_or(0));
         if (least[0] - least[1]).abs() > CHANCE {
             best.stop = Stop::StartsDisagree;
         }
-        let agreeing = costs.iter().filter(|cost| **cost - best.local.value <= SAME).count();
         (best, agreeing.min(self.starts))
     }
 
@@ -212,6 +216,24 @@ fn search_freely(
 ) -> Minimum {
     let [lower, upper] = coordinates.bounds(start);
     search.run(start, [&lower, &upper], cost)
+}
+
+/// A search that ended at the largest permittivity, started again at the least one: a dielectric of 10⁹ still lets a
+/// ten-thousandth in, and a metal nothing.
+fn metal(coordinates: &Coordinates, at: &DVector<f64>) -> Option<DVector<f64>> {
+    let index = (0..at.len()).find(|&index| {
+        let number = &coordinates.list[index];
+        let ([low, high], [rising, _]) = (number.ends(), number.rising_ends());
+        low < rising && at[index] == high
+    })?;
+    let mut metal = at.clone();
+    metal[index] = coordinates.list[index].ends()[0];
+    Some(metal)
+}
+
+/// The cost of an end; one without a finite cost is the worst.
+fn rank(end: &Minimum) -> f64 {
+    if end.local.value.is_finite() { end.local.value } else { f64::INFINITY }
 }
 
 /// Where a search of the likelihood ends from a start that may be far.
