@@ -258,6 +258,87 @@ fn a_range_receiver_has_its_own_noise_and_threshold() {
     assert!(message.contains("noise_figure_db"), "{message}");
 }
 
+/// Of wood, a smooth mirror over a diffuse surface, a part of an echo does not speckle.
+#[test]
+fn a_wave_that_does_not_speckle_is_no_effect() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let many = SCENE.replace("mannequin-paint", "wood");
+    let many = many.replace("rotation_deg = [-15, 10, 0]", "rotation_deg = [-3, 2, 0]");
+    let few = many.replace("chirps = 3000", "chirps = 1500");
+    let effects = ["--effects", "speckle,compression,foreign-patch,drift"];
+    for seed in [3, 4, 5] {
+        let name = format!("seed-{seed}");
+        render(at, &name, &few.replace("seed = 3", &format!("seed = {seed}")));
+        let cloud = format!("{name}/cloud.ply");
+        let complete = diagnosed(at, &cloud, "seed-3.toml", &effects);
+        assert_eq!(complete["verdict"], "no-missing-effect", "{seed}: {}", complete["effects"]);
+    }
+    fs::write(at.join("many.toml"), &many).unwrap();
+    render(at, "drift", &format!("{many}{DRIFT}"));
+    assert_drift(&diagnosed(at, "drift/cloud.ply", "many.toml", &effects));
+}
+
+/// A sphere and a plate behind a cloth, 4 cm and a few millimetres in front of them.
+fn behind_a_cloth(returns: &str) -> String {
+    let scene = SCENE.replace("chirps = 3000", "chirps = 1500");
+    let scene = scene.replace("[radar]\n", &format!("[radar]\nreturns = \"{returns}\"\n"));
+    let scene = scene.replace("material =", "mesh = \"sphere\"\nmaterial =");
+    format!(
+        "{scene}[[region]]\nname = \"board\"\nmaterial = \"mannequin-paint\"\nmesh = \"plate\"\n\
+         [[mesh]]\nname = \"cloth\"\nfile = \"builtin:sphere\"\nsize_m = [0.58, 0.58, 0.58]\n\
+         translation_m = [0.0, 1.25, 0.0]\n\
+         [[region]]\nname = \"cloth\"\nmaterial = \"cotton\"\nmesh = \"cloth\"\nthickness_m = 0.0005\n"
+    )
+}
+
+/// Which echo of a chirp is reported follows from `returns`, and the others are no effect.
+#[test]
+fn what_lies_behind_a_sheet_has_its_own_prediction() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let effects = ["--effects", "foreign-patch,speckle,subsurface,drift"];
+    for returns in ["strongest", "first"] {
+        let scene = behind_a_cloth(returns);
+        render(at, returns, &scene);
+        let (cloud, scene_file) = (format!("{returns}/cloud.ply"), format!("{returns}.toml"));
+        let complete = diagnosed(at, &cloud, &scene_file, &effects);
+        assert_eq!(complete["verdict"], "no-missing-effect", "{returns}: {}", complete["effects"]);
+    }
+    render(at, "drift", &format!("{}{DRIFT}", behind_a_cloth("strongest")));
+    assert_drift(&diagnosed(at, "drift/cloud.ply", "strongest.toml", &effects));
+    let arguments = ["diagnose", "drift/cloud.ply", "--scene", "strongest.toml", "-o", "x"];
+    let message = refused(matdb(at).args(arguments).args(["--effects", "drift,pose"]));
+    assert!(message.contains("pose") && message.contains("let them pass on"), "{message}");
+    let several = behind_a_cloth("strongest").replace("[radar]\n", "[spot]\nrays = 16\n[radar]\n");
+    fs::write(at.join("several.toml"), several).unwrap();
+    let several = ["diagnose", "drift/cloud.ply", "--scene", "several.toml", "-o", "x"];
+    let message = refused(matdb(at).args(several));
+    assert!(message.contains("spot.rays = 1"), "{message}");
+}
+
+/// An echo that spreads over range cells, and paths by way of a second surface, as a range receiver reads them.
+#[test]
+fn a_range_receiver_reads_spots_and_second_paths() {
+    let noise = "[radar.noise]\nlevel_dbm = -110\nrange_sd_m = 0.002\n";
+    let receiver = "[radar.receiver]\nnoise_figure_db = 45\nfalse_alarm_probability = 1e-4\n\
+                    gate_m = [7.0, 9.0]\nzero_padding = 4\n";
+    let read = SCENE.replace(noise, receiver).replace("chirps = 3000", "chirps = 1500");
+    let several = read.replace("[radar]\n", "[spot]\nrays = 64\n[radar]\n");
+    let corner = read.replace("rotation_deg = [-15, 10, 0]", "rotation_deg = [-80, 0, 0]");
+    let bounce = corner.replace("[radar]\n", "[bounce]\nrays = 64\n[radar]\n");
+    let effects = ["--effects", "foreign-patch,drift"];
+    for scene in [several, bounce] {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path();
+        render(at, "scene", &scene);
+        render(at, "drift", &format!("{scene}{DRIFT}"));
+        let complete = diagnosed(at, "scene/cloud.ply", "scene.toml", &effects);
+        assert_eq!(complete["verdict"], "no-missing-effect", "{}", complete["effects"]);
+        assert_drift(&diagnosed(at, "drift/cloud.ply", "scene.toml", &effects));
+    }
+}
+
 /// A radar that was never calibrated: its scene states a loss that is 15 dB wrong, to either side.
 #[test]
 fn the_level_of_a_radar_is_no_effect() {
@@ -435,10 +516,12 @@ fn nothing_detected_and_scenes_that_no_diagnosis_predicts_are_said() {
     assert!(refused(matdb(at).args(none)).contains("0 detections"));
     assert_eq!(json(&at.join("report/report.json"))["verdict"], "cannot-tell");
     let scene = fs::read_to_string(at.join("scene.toml")).unwrap();
-    fs::write(at.join("more.toml"), format!("{scene}\n[radar.receiver]\n[bounce]\n")).unwrap();
+    let noise = "[radar.noise]\nlevel_dbm = -110\nrange_sd_m = 0.002\n";
+    let first = scene.replace("[radar]\n", "[radar]\nreturns = \"first\"\n");
+    fs::write(at.join("more.toml"), first.replace(noise, "[radar.receiver]\n")).unwrap();
     let more = ["diagnose", "out/cloud.ply", "--scene", "more.toml", "-o", "more"];
     let message = refused(matdb(at).args(more));
-    assert!(message.contains("more.toml") && message.contains("[radar.noise]"), "{message}");
+    assert!(message.contains("more.toml") && message.contains("radar.returns"), "{message}");
     assert!(!at.join("more").exists());
     let unknown = ["diagnose", "out/cloud.ply", "--scene", "scene.toml", "-o", "more"];
     let message = refused(matdb(at).args(unknown).args(["--effects", "unknown"]));

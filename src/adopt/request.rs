@@ -6,11 +6,11 @@ use super::earlier::check_folder;
 use super::recipients::{check_fit_name, find_recipient};
 use super::scene_after::{AFTER, after_of, check_beside};
 use crate::diagnose::{DiagnoseError, MeasuredScene, Report, declared_receiver, diagnose_together};
-use crate::effects::{About, Antenna, BeamSpot, Effect, SecondBounce, Setting, library};
+use crate::effects::{About, Antenna, BeamSpot, Effect, RangeCell, SecondBounce, Setting, library};
 use crate::error::Error;
 use crate::files::folder_of;
 use crate::measure::{Cloud, CloudError};
-use crate::radar::{Pattern, Receiver, Returns};
+use crate::radar::{Pattern, RadarError, Receiver, Returns};
 use crate::report::{Choice, Measurands, Reason};
 use crate::scene::{Scene, read_text};
 use crate::setup::{ReadyScene, antenna};
@@ -224,7 +224,7 @@ impl<'a> CloudRequest<'a> {
         };
         for ready in scenes {
             let (model, scene) = (ready.model(), &ready.scene);
-            let rendered = Rendered::of(scene);
+            let rendered = Rendered::of(scene, None);
             for (effect, _) in model.iter().flat_map(|model| &model.effects) {
                 declared.push(effect.name());
             }
@@ -300,7 +300,12 @@ impl CheckedRequest<'_> {
         hear: &(dyn Fn(&str) + Sync),
     ) -> Result<Report, DiagnoseError> {
         let models: Vec<_> = self.scenes().map(ReadyScene::model).collect();
-        let rendered: Vec<_> = self.scenes().map(|ready| Rendered::of(&ready.scene)).collect();
+        let rendered = self.scenes().map(|ready| {
+            let several_paths = has_several_paths(&ready.scene);
+            let cell = if several_paths { RangeCell::of(ready.scene.radar())? } else { None };
+            Ok(Rendered::of(&ready.scene, cell))
+        });
+        let rendered = rendered.collect::<Result<Vec<_>, RadarError>>()?;
         let laws: Vec<_> =
             self.scenes().map(|ready| (ready.laws(), ready.seen_lobe_rad())).collect();
         let declared: Vec<Vec<(&dyn Effect, Vec<f64>)>> = std::iter::zip(&models, &rendered)
@@ -373,12 +378,14 @@ struct Rendered {
 }
 
 impl Rendered {
-    fn of(scene: &Scene) -> Rendered {
+    /// Of a scene, with echoes as a range receiver reads them.
+    fn of(scene: &Scene, cell: Option<RangeCell>) -> Rendered {
         let diameter_m = scene.radar().spot_fwhm_m();
-        let spot = (scene.file.spot.rays > 1).then_some(BeamSpot { diameter_m });
+        let spot = (scene.file.spot.rays > 1).then_some(BeamSpot { diameter_m, cell });
         let bounce = scene.file.bounce.map(|bounce| SecondBounce {
             outside_spot: ratio_from_db(bounce.outside_spot_db),
             in_phase: bounce.in_phase,
+            cell,
         });
         Rendered { spot, bounce }
     }
@@ -410,6 +417,11 @@ fn check_declared(ready: &ReadyScene, path: &Path, antenna: Option<Antenna>) -> 
     Ok(())
 }
 
+/// Whether a chirp has several paths to the first surfaces and back.
+fn has_several_paths(scene: &Scene) -> bool {
+    scene.file.spot.rays > 1 || scene.file.bounce.is_some()
+}
+
 /// Refuses what a scene declares and no diagnosis predicts: it would be found as an effect.
 fn check_predicted(scene: &Scene, path: &Path, antenna: Option<Antenna>) -> Result<(), Error> {
     let radar = scene.radar();
@@ -417,16 +429,11 @@ fn check_predicted(scene: &Scene, path: &Path, antenna: Option<Antenna>) -> Resu
         let Receiver { leakage, phase_noise, sweep_ripple, .. } = receiver;
         leakage.is_some() || phase_noise.is_some() || sweep_ripple.is_some()
     });
-    let several_paths = scene.file.spot.rays > 1 || scene.file.bounce.is_some();
+    let several_paths = has_several_paths(scene);
     let (what, way_out) = if has_faults {
         (
             "leakage, phase noise and a rippled sweep",
             "remove these tables of [radar.receiver], or replace it by [radar.noise]",
-        )
-    } else if radar.receiver.is_some() && several_paths {
-        (
-            "how a range receiver resolves several paths of a chirp",
-            "replace [radar.receiver] by [radar.noise], or set spot.rays = 1 and remove [bounce]",
         )
     } else if radar.receiver.is_some() && radar.returns != Returns::Strongest {
         ("which of several echoes is not the strongest", "set radar.returns = \"strongest\"")

@@ -76,6 +76,19 @@ impl Term {
         Term { level_per_sr: reflectance / (4.0 * PI), cosines: -6.0, facets: Some(facets) }
     }
 
+    /// Share of it, 0 to 1, that comes back in one phase to a beam of a divergence, rad: all of a mirror, whose lobe is the
+    /// beam's.
+    pub(crate) fn coherent_share(&self, beam_rad: f64) -> f64 {
+        match self.facets {
+            None => 0.0,
+            Some(facets) if facets.includes_beam || facets.m == 0.0 => 1.0,
+            Some(facets) => {
+                let [beam2, m2] = [beam_rad, facets.m].map(|width_rad| width_rad * width_rad);
+                beam2 / (m2 + beam2)
+            }
+        }
+    }
+
     /// Its part of f, 1/sr; zero at grazing incidence.
     pub(crate) fn per_sr(&self, look: Look) -> f64 {
         let mut f_per_sr = [0.0];

@@ -36,7 +36,7 @@ impl Stray {
     /// Whether the detection lies beside an edge of the target where the effects of a model place it, within the reach of the
     /// radar's own beam.
     pub(super) fn is_beside_edge(&self, model: &Model, stage: &Stage) -> bool {
-        let beam = BeamSpot { diameter_m: stage.geometry.radar.spot_fwhm_m() };
+        let beam = own_beam(stage);
         self.shot.is_some_and(|shot| shot.misses())
             && self.is_on_target(&with_own_beam(model, &beam), stage)
     }
@@ -78,31 +78,21 @@ pub fn match_cloud(
     returns: Returns,
     antenna: Option<Antenna>,
 ) -> Result<CloudMatch, DiagnoseError> {
-    let scan = Scan { threshold_w, returns, antenna, ..Scan::new(chirps) };
-    let is_numbered = cloud.points().iter().all(|point| point.chirp.is_some());
-    if !is_numbered && scan.directions.is_none() {
-        return Err(DiagnoseError::Unnumbered);
-    }
-    if is_numbered && let Some(off) = scan.number_off(cloud) {
-        return Err(DiagnoseError::Misnumbered { off });
-    }
-    let own = scan.assign(cloud, shots, is_numbered);
-    if own.is_of_target(cloud) {
-        return Ok(own.cloud_match);
-    }
-    let (matched, points) = (own.on_target, cloud.points().len());
-    if own.second as f64 > MOST_STRAYS * points as f64 {
-        return Err(DiagnoseError::Repeated { second: own.second, points });
-    }
-    // Row numbers are not the chirps of the scan; a cloud that is only out of place keeps its chirps.
-    if is_numbered && scan.directions.is_some() && !scan.is_shifted(cloud) {
-        let by_direction = scan.assign(cloud, shots, false);
-        if by_direction.is_of_target(cloud) {
-            let placed = by_direction.on_target;
-            return Err(DiagnoseError::Strange { placed, matched, points });
-        }
-    }
-    Err(DiagnoseError::Elsewhere { matched, points })
+    Scan { threshold_w, returns, antenna, ..Scan::new(chirps) }.match_cloud(cloud, shots)
+}
+
+/// As [`match_cloud`], for a radar that reports its strongest detection and whose receiver parts second-order paths from the first
+/// surface: a detection farther than that by more than `parted_m`, m, a range cell and what a spot spreads on a slope of 45°, is by
+/// such a path, and the first surface then was weaker.
+pub(super) fn match_parted(
+    cloud: &Cloud,
+    chirps: &Chirps,
+    shots: &[Shot],
+    threshold_w: f64,
+    parted_m: [f64; 2],
+) -> Result<CloudMatch, DiagnoseError> {
+    let parted_m = Some(parted_m);
+    Scan { threshold_w, parted_m, ..Scan::new(chirps) }.match_cloud(cloud, shots)
 }
 
 /// An assignment and its quality.
@@ -135,6 +125,9 @@ struct Scan<'a> {
     returns: Returns,
     /// The antenna of the cloud; none for the radar's own.
     antenna: Option<Antenna>,
+    /// Length of a range cell, and how far a spot spreads in range on a slope of 45°, m, where second-order paths part from the first
+    /// surface.
+    parted_m: Option<[f64; 2]>,
     /// `None` unless all rays start from one point.
     directions: Option<Directions>,
 }
@@ -143,8 +136,51 @@ impl Scan<'_> {
     fn new(chirps: &Chirps) -> Scan<'_> {
         let index_of_chirp = chirps.number.iter().copied().zip(0..).collect();
         let directions = Directions::new(chirps);
-        let returns = Returns::Strongest;
-        Scan { chirps, index_of_chirp, threshold_w: 0.0, returns, antenna: None, directions }
+        Scan {
+            chirps,
+            index_of_chirp,
+            threshold_w: 0.0,
+            returns: Returns::Strongest,
+            antenna: None,
+            parted_m: None,
+            directions,
+        }
+    }
+
+    /// Assigns the points of a cloud to the shots.
+    fn match_cloud(&self, cloud: &Cloud, shots: &[Shot]) -> Result<CloudMatch, DiagnoseError> {
+        let is_numbered = cloud.points().iter().all(|point| point.chirp.is_some());
+        if !is_numbered && self.directions.is_none() {
+            return Err(DiagnoseError::Unnumbered);
+        }
+        if is_numbered && let Some(off) = self.number_off(cloud) {
+            return Err(DiagnoseError::Misnumbered { off });
+        }
+        let own = self.assign(cloud, shots, is_numbered);
+        if own.is_of_target(cloud) {
+            return Ok(own.cloud_match);
+        }
+        let (matched, points) = (own.on_target, cloud.points().len());
+        if own.second as f64 > MOST_STRAYS * points as f64 {
+            return Err(DiagnoseError::Repeated { second: own.second, points });
+        }
+        // Row numbers are not the chirps of the scan; a cloud that is only out of place keeps its chirps.
+        if is_numbered && self.directions.is_some() && !self.is_shifted(cloud) {
+            let by_direction = self.assign(cloud, shots, false);
+            if by_direction.is_of_target(cloud) {
+                let placed = by_direction.on_target;
+                return Err(DiagnoseError::Strange { placed, matched, points });
+            }
+        }
+        Err(DiagnoseError::Elsewhere { matched, points })
+    }
+
+    /// Whether a point is by way of a second surface, in place of the first one that its shot meets.
+    fn is_by_second(&self, point: &CloudPoint, shot: &Shot) -> bool {
+        let Some([cell_m, spot_m]) = self.parted_m else { return false };
+        let slope = shot.hit.theta_rad().tan();
+        let farther_m = self.range_m(point, shot) - self.expected_m(shot);
+        farther_m > cell_m + spot_m * slope && off_ray_m(point, &shot.ray).length() <= ON_RAY_M
     }
 
     /// The ray of a chirp.
@@ -305,7 +341,10 @@ impl Scan<'_> {
                 let range_m = self.range_m(point, shot);
                 let is_near = self.off_m(point, shot) <= GATE_M;
                 let is_first = observation.power_w.is_none();
-                if is_near && is_first {
+                if is_first && self.is_by_second(point, shot) {
+                    on_target += 1;
+                    observation.limit_w = Some(point.power_w);
+                } else if is_near && is_first {
                     on_target += 1;
                     *observation = Observation::detected(point.power_w, Some(range_m));
                     // Noise hardly ever reaches more.
@@ -421,7 +460,7 @@ fn expected_near(
 /// How many false alarms lie beside an edge by chance, where others do not.
 pub(super) fn expected_beside_edge(alarms: &[(Shot, f64)], model: &Model, stage: &Stage) -> f64 {
     let Some(ranges_m) = ranges_of_gate(alarms) else { return 0.0 };
-    let beam = BeamSpot { diameter_m: stage.geometry.radar.spot_fwhm_m() };
+    let beam = own_beam(stage);
     let model = with_own_beam(model, &beam);
     let chances = alarms.par_iter().map(|(shot, _)| {
         let edges_m = model.ranges_m(stage, shot);
@@ -443,6 +482,11 @@ fn ranges_of_gate(alarms: &[(Shot, f64)]) -> Option<[f64; RANGES]> {
     let step_m = (ranges_m.fold(0.0, f64::max) - nearest_m) / RANGES as f64;
     let all_m = std::array::from_fn(|step| nearest_m + (step as f64 + 0.5) * step_m);
     (alarms.len() >= LEAST).then_some(all_m)
+}
+
+/// The radar's own beam, which reads ranges as a radar without a range receiver does.
+fn own_beam(stage: &Stage) -> BeamSpot {
+    BeamSpot { diameter_m: stage.geometry.radar.spot_fwhm_m(), cell: None }
 }
 
 /// A model whose chirps see all that the radar's own beam reaches.

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::error::DiagnoseError;
-use super::matching::match_cloud;
+use super::matching::{match_cloud, match_parted};
 use super::observation::ReceiverLimits;
 use super::report::{MeshPose, Report};
 use super::settings::Diagnosis;
@@ -95,8 +95,13 @@ pub fn diagnose_together(
         stage.middle = middle(&own);
         // The cloud against the chirps.
         let ReceiverLimits { threshold_w, .. } = declared;
-        let mut matched =
-            match_cloud(cloud, &scene.chirps, &own, threshold_w, radar.returns, antenna)?;
+        let chirps = &scene.chirps;
+        let mut matched = if radar.receiver.is_some() && scene.file.bounce.is_some() {
+            let parted_m = [radar.range_cell_m(), radar.spot_fwhm_m()];
+            match_parted(cloud, chirps, &own, threshold_w, parted_m)?
+        } else {
+            match_cloud(cloud, chirps, &own, threshold_w, radar.returns, antenna)?
+        };
         matched.alarms.cells = radar.gate_cells();
         matched.alarms.looks = radar.noise_looks();
         let of_strays = matched.strays.iter_mut().filter_map(|stray| stray.shot.as_mut());

@@ -908,3 +908,46 @@ fn the_first_scan_sees_the_points_of_the_others_where_they_are() {
     let refused = [stages[0], other.stage()];
     assert!(matches!(views::Views::new(&refused), Err(DiagnoseError::OtherTarget { cloud: 2 })));
 }
+
+/// Of two echoes of a chirp one is reported, and what that says of the other depends on which is.
+#[test]
+fn a_reported_echo_limits_the_others_of_its_chirp() {
+    use crate::measure::cloud::{Cloud, CloudPoint};
+    let bench = Bench::new(target());
+    let stage = bench.stage();
+    const BEHIND_M: f64 = 0.03;
+    let layers = |shot: Shot| [shot, Shot { sheets: 1, longer_m: BEHIND_M, ..shot }];
+    let shots: Vec<Shot> = trace_shots(&stage).unwrap().into_iter().flat_map(layers).collect();
+    let point = |shot: usize, power_w: f64| {
+        let Shot { ray, hit, chirp, longer_m, .. } = shots[shot];
+        let xyz = ray.origin.xyz + (hit.range_m + longer_m + 1e-3) * ray.direction.xyz();
+        CloudPoint { chirp: Some(chirp), point: Point::from(xyz), range_m: None, power_w }
+    };
+    // Of one chirp the nearer echo, of another the farther one, and of a third both where all are reported.
+    let [near_w, far_w] = [10.0 * THRESHOLD_W, 7.0 * THRESHOLD_W];
+    let mut points = vec![point(40, near_w), point(43, far_w)];
+    let observed = |points: &[CloudPoint], returns| {
+        let cloud = Cloud::new(points.to_vec()).unwrap();
+        let found = match_cloud(&cloud, &bench.chirps, &shots, THRESHOLD_W, returns, None).unwrap();
+        assert!(found.strays.is_empty());
+        let seen = &found.observations[40..46];
+        seen.iter().map(|one| (one.power_w.is_some(), one.limit_w)).collect::<Vec<_>>()
+    };
+    let [is_seen, silent] = [(true, None), (false, None)];
+    let below = |limit_w| (false, Some(limit_w));
+    assert_eq!(
+        observed(&points, Returns::Strongest),
+        [is_seen, below(near_w), below(far_w), is_seen, silent, silent]
+    );
+    // The nearer one would have been reported in place of the farther one.
+    assert_eq!(
+        observed(&points, Returns::First),
+        [is_seen, below(NO_LIMIT_W), silent, is_seen, silent, silent]
+    );
+    points.extend([point(44, near_w), point(45, far_w)]);
+    points.iter_mut().for_each(|point| point.chirp = None);
+    assert_eq!(
+        observed(&points, Returns::All),
+        [is_seen, silent, silent, is_seen, is_seen, is_seen]
+    );
+}

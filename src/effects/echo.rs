@@ -13,12 +13,14 @@ pub struct MeanEcho {
     /// Share of the power, 0 to 1, that comes back in one phase and does not speckle. Of waves whose phases relative to each
     /// other are unknown, one sees √ΣCᵢ²/P.
     pub coherent_share: f64,
+    /// Factor on the looks of what speckles, 1 unless a receiver picks the strongest of several range cells.
+    pub more_looks: f64,
 }
 
 impl MeanEcho {
     /// An echo from one range, all of which speckles.
     pub fn at_once(power_w: f64, range_m: f64) -> MeanEcho {
-        MeanEcho { power_w, range_m, spread_m: 0.0, coherent_share: 0.0 }
+        MeanEcho { power_w, range_m, spread_m: 0.0, coherent_share: 0.0, more_looks: 1.0 }
     }
 
     /// The sum of both echoes; unchanged if neither has power.
@@ -34,7 +36,8 @@ impl MeanEcho {
         let range_m = self.range_m + share * apart_m;
         let spread_m = (within_m2 + between_m2).sqrt();
         let [own, others] = [(1.0 - share) * self.coherent_share, share * other.coherent_share];
-        MeanEcho { power_w, range_m, spread_m, coherent_share: own.hypot(others) }
+        let more_looks = self.more_looks + share * (other.more_looks - self.more_looks);
+        MeanEcho { power_w, range_m, spread_m, coherent_share: own.hypot(others), more_looks }
     }
 }
 
@@ -65,7 +68,7 @@ mod tests {
         let both = a.with(b);
         assert!((mean / both.power_w - 1.0).abs() < 0.02, "{mean}");
         let receiver = Receiver { looks: 1.0, ..Receiver::LINEAR };
-        let looks = receiver.looks_of(both.coherent_share);
+        let looks = receiver.looks_of(both.coherent_share, 1.0);
         assert!((looks * variance / (mean * mean) - 1.0).abs() < 0.03, "{looks} {variance}");
     }
 }

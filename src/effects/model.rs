@@ -113,11 +113,14 @@ impl Prediction {
     /// Looks of a shot's power, whose mean without noise is `power_w`, W: more than those of the speckle where a part of the
     /// echo does not speckle.
     pub fn looks(&self, shot: usize, power_w: f64) -> f64 {
-        let share = self.arrived.get(shot).copied().flatten().map_or(0.0, |a| a.coherent_share);
-        if share == 0.0 {
-            return self.receiver.looks;
+        match self.arrived.get(shot).copied().flatten() {
+            Some(echo) if echo.coherent_share != 0.0 || echo.more_looks != 1.0 => {
+                let of_echo = power_w / (power_w + self.receiver.noise_w);
+                let more = 1.0 + of_echo * (echo.more_looks - 1.0);
+                self.receiver.looks_of(echo.coherent_share * of_echo, more)
+            }
+            _ => self.receiver.looks,
         }
-        self.receiver.looks_of(share * power_w / (power_w + self.receiver.noise_w))
     }
 
     /// Mean power of a shot with thermal noise before the receiver, W.

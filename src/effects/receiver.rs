@@ -38,14 +38,16 @@ impl Receiver {
     ///
     /// One look has the amplitude √C + z, z circular Gaussian of mean square G = μ − C. Its power C + 2√C·Re z + |z|² has the
     /// variance 2CG + G² = μ² − C², since Re z and |z|² are not correlated. Over L looks that is μ²(1 − c²)/L, and Gamma's is
-    /// μ²/L. A share of less than a tenth counts as none, beyond which c² starts from 0.
-    pub fn looks_of(&self, coherent_share: f64) -> f64 {
+    /// μ²/L. A share of less than a tenth counts as none, beyond which c² starts from 0. `more`: factor on the looks.
+    pub fn looks_of(&self, coherent_share: f64, more: f64) -> f64 {
         const LEAST2: f64 = LEAST_COHERENT * LEAST_COHERENT;
         let share2 = coherent_share * coherent_share;
-        if share2 <= LEAST2 {
-            return self.looks;
-        }
-        let looks = self.looks * (1.0 - LEAST2) / (1.0 - share2).max(f64::MIN_POSITIVE);
+        let wave = if share2 > LEAST2 {
+            (1.0 - LEAST2) / (1.0 - share2).max(f64::MIN_POSITIVE)
+        } else {
+            1.0
+        };
+        let looks = more * wave * self.looks;
         looks.min(self.most_looks.max(self.looks))
     }
 
@@ -88,7 +90,7 @@ mod tests {
             let mean = powers.iter().sum::<f64>() / COUNT as f64;
             let variance = powers.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / COUNT as f64;
             let receiver = Receiver { looks: f64::from(looks), ..Receiver::LINEAR };
-            let found = receiver.looks_of(share);
+            let found = receiver.looks_of(share, 1.0);
             // The draws determine the variance to 1 %; what counts as no share takes another 1 %.
             assert!((found * variance - 1.0).abs() < 0.03, "{looks} {share}: {found} {variance}");
         }
@@ -97,10 +99,10 @@ mod tests {
     #[test]
     fn small_shares_are_none_and_a_mirror_has_an_end() {
         let receiver = Receiver { looks: 4.0, ..Receiver::LINEAR };
-        assert_eq!(receiver.looks_of(LEAST_COHERENT), 4.0);
-        assert!((receiver.looks_of(LEAST_COHERENT + 1e-6) / 4.0 - 1.0).abs() < 1e-6);
-        assert_eq!(receiver.looks_of(1.0), MOST_LOOKS);
+        assert_eq!(receiver.looks_of(LEAST_COHERENT, 1.0), 4.0);
+        assert!((receiver.looks_of(LEAST_COHERENT + 1e-6, 1.0) / 4.0 - 1.0).abs() < 1e-6);
+        assert_eq!(receiver.looks_of(1.0, 1.0), MOST_LOOKS);
         // What is judged with much speckle has it everywhere.
-        assert_eq!(Receiver { most_looks: 4.0, ..receiver }.looks_of(0.9), 4.0);
+        assert_eq!(Receiver { most_looks: 4.0, ..receiver }.looks_of(0.9, 1.0), 4.0);
     }
 }

@@ -252,7 +252,7 @@ impl Correlation {
             n += 1.0;
             weight *= g / n;
             let share = weight * spectrum(n);
-            if !(share > LEAST_TERM) {
+            if share.is_nan() || share <= LEAST_TERM {
                 break;
             }
             sum += share;
@@ -262,7 +262,7 @@ impl Correlation {
             weight *= n / g;
             n -= 1.0;
             let share = weight * spectrum(n);
-            if !(share > LEAST_TERM) {
+            if share.is_nan() || share <= LEAST_TERM {
                 break;
             }
             sum += share;

@@ -13,7 +13,8 @@ use crate::effects::cache::Cache;
 use crate::effects::echo::MeanEcho;
 use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level, Setting, Survey};
 use crate::effects::intersection::{Facet, HitSurface, surface_at};
-use crate::effects::shot::{Shot, Stage, returns_wave};
+use crate::effects::range_cell::RangeCell;
+use crate::effects::shot::{Shot, Stage};
 use crate::effects::spread::sunflower;
 use crate::frames::{Direction, Global, Ray, Surface};
 use crate::radar::GaussianBeam;
@@ -26,6 +27,8 @@ pub(crate) struct FiniteSpot;
 pub(crate) struct BeamSpot {
     /// Its diameter at half the intensity in the middle of the field, m. Each shot is averaged over the beam where it is.
     pub diameter_m: f64,
+    /// How a range receiver reads it; none without one.
+    pub cell: Option<RangeCell>,
 }
 
 /// The diameter of spots at half the intensity.
@@ -106,14 +109,6 @@ impl SpotRay {
     fn power_w(&self, region: u16, f: impl Fn(f64, Direction<Surface>) -> f64) -> f64 {
         if self.region == region { self.watts_per_f * f(self.beam_rad, self.to_radar) } else { 0.0 }
     }
-
-    /// The part of its power, W, that is one wave.
-    fn coherent_w(&self, laws: &[Brdf]) -> f64 {
-        let Some(law) = laws.get(usize::from(self.region)) else { return 0.0 };
-        let seen_by = |beam_rad| law.seen_by(beam_rad, self.to_radar, self.to_radar);
-        let share = seen_by(self.divergence_rad).coherent_share;
-        if share == 0.0 { 0.0 } else { self.watts_per_f * share * seen_by(self.beam_rad).f_per_sr }
-    }
 }
 
 /// The ray of a shot and those of its spot, as far as they hit the target as the scene has it.
@@ -122,8 +117,6 @@ type Spot = (SpotRay, Vec<SpotRay>);
 /// The spots of all shots.
 struct Spots {
     all: Vec<Option<Spot>>,
-    /// Divergence of the beam in the middle of the field, rad.
-    divergence_rad: f64,
     /// Diameter of the beam at each, m.
     of_beam_m: Vec<f64>,
     /// Their answers to terms of level 1, for a diameter in bits: a law's levels change more often than its shape.
@@ -136,9 +129,6 @@ struct ShadedSpots {
     laws: Vec<Brdf>,
     /// Answers to laws that are no sums of terms, by region and diameter.
     sums: Cache<(u16, u64), Vec<Sums>>,
-    /// Whether a law returns a wave, and its power in each spot, W, by diameter.
-    has_waves: bool,
-    waves: Cache<u64, Vec<f64>>,
 }
 
 /// What a spot sends back from one region by one term of its law.
@@ -150,15 +140,18 @@ struct Sums {
     /// Moments of what adds to the range, W·m and W·m².
     first: f64,
     second: f64,
+    /// Power of all rays that is one wave, W.
+    coherent_w: f64,
 }
 
 impl Sums {
-    /// Of a region's rays by their weights, for f of a beam's divergence, rad, and a direction, 1/sr.
+    /// Of a region's rays by their weights, for f, 1/sr, and its coherent share of a beam's divergence, rad, and a direction.
     fn of(
         (centre, spot): &Spot,
         weights: &[f64; RAYS],
         region: u16,
         f: impl Fn(f64, Direction<Surface>) -> f64,
+        coherent_share: impl Fn(f64, Direction<Surface>) -> f64,
     ) -> Sums {
         let mut sums = Sums { centre_w: centre.power_w(region, &f), ..Sums::default() };
         for ray in spot {
@@ -171,6 +164,9 @@ impl Sums {
             sums.power_w += power_w;
             sums.first += power_w * longer_m;
             sums.second += power_w * longer_m * longer_m;
+            if power_w > 0.0 {
+                sums.coherent_w += power_w * coherent_share(ray.divergence_rad, ray.to_radar);
+            }
         }
         sums
     }
@@ -182,18 +178,20 @@ impl Sums {
             power_w: self.power_w + level * more.power_w,
             first: self.first + level * more.first,
             second: self.second + level * more.second,
+            coherent_w: self.coherent_w + level * more.coherent_w,
         }
     }
 
     /// The mean over a whole spot by the base law; `None` where nothing comes back.
     fn averaged(&self) -> Option<SpotMean> {
-        let Sums { centre_w, power_w, first, second } = *self;
+        let Sums { centre_w, power_w, first, second, coherent_w } = *self;
         if centre_w <= 0.0 || power_w <= 0.0 {
             return None;
         }
         let (mean_w, longer_m) = (power_w, first / power_w);
         let spread_m = (second / power_w - longer_m * longer_m).max(0.0).sqrt();
-        Some(SpotMean { centre_w, mean_w, longer_m, spread_m })
+        let coherent_share = coherent_w / power_w;
+        Some(SpotMean { centre_w, mean_w, longer_m, spread_m, coherent_share })
     }
 }
 
@@ -206,8 +204,12 @@ impl ShadedSpots {
         for (region, law) in (0..).zip(&self.laws) {
             let Some(terms) = law.backscatter() else {
                 let sums = self.sums.get_or_make((region, key), || {
-                    let f = |beam_rad, v| law.seen_by(beam_rad, v, v).f_per_sr;
-                    self.spots.sums(diameter, region, f)
+                    self.spots.sums(
+                        diameter,
+                        region,
+                        |beam_rad, v| law.seen_by(beam_rad, v, v).f_per_sr,
+                        |beam_rad, v| law.seen_by(beam_rad, v, v).coherent_share,
+                    )
                 });
                 answers.push((1.0, sums));
                 continue;
@@ -215,9 +217,12 @@ impl ShadedSpots {
             for term in terms {
                 let shape = Term { level_per_sr: 1.0, ..term };
                 let sums = self.spots.sums.get_or_make((region, shape, key), || {
-                    self.spots.sums(diameter, region, |beam_rad, v| {
-                        shape.per_sr(Look { beam_rad, cos_theta: v.cos_theta() })
-                    })
+                    self.spots.sums(
+                        diameter,
+                        region,
+                        |beam_rad, v| shape.per_sr(Look { beam_rad, cos_theta: v.cos_theta() }),
+                        |beam_rad, _| shape.coherent_share(beam_rad),
+                    )
                 });
                 answers.push((term.level_per_sr, sums));
             }
@@ -227,40 +232,26 @@ impl ShadedSpots {
 }
 
 impl Spots {
-    /// The sums of every spot over the rays of a region, for f of a beam's divergence, rad, and a direction, 1/sr.
+    /// The sums of every spot over the rays of a region, for f, 1/sr, and its coherent share of a beam's divergence, rad, and a
+    /// direction.
     fn sums(
         &self,
         diameter: Diameter,
         region: u16,
         f: impl Fn(f64, Direction<Surface>) -> f64 + Sync,
+        coherent_share: impl Fn(f64, Direction<Surface>) -> f64 + Sync,
     ) -> Vec<Sums> {
-        self.weighed(diameter, |spot, weights| Sums::of(spot, weights, region, &f))
-    }
-
-    /// Power that every spot returns in one wave, W.
-    fn coherent_w(&self, diameter: Diameter, laws: &[Brdf]) -> Vec<f64> {
-        self.weighed(diameter, |(_, spot), weights| {
-            let rays = spot.iter().map(|ray| (weights[usize::from(ray.number)], ray));
-            rays.filter(|(weight, _)| *weight > 0.0).map(|(w, ray)| w * ray.coherent_w(laws)).sum()
-        })
-    }
-
-    /// Something of every spot by the weights of its rays; nothing of one that misses.
-    fn weighed<T: Default + Send>(
-        &self,
-        diameter: Diameter,
-        of: impl Fn(&Spot, &[f64; RAYS]) -> T + Sync,
-    ) -> Vec<T> {
         let common = match diameter {
             Diameter::Of(diameter_m) => Some(weights(diameter_m)),
             Diameter::OfBeam => None,
         };
         let spots = self.all.par_iter().zip(&self.of_beam_m);
-        let weighed = spots.map(|(spot, of_beam_m)| {
-            let Some(spot) = spot else { return T::default() };
-            of(spot, &common.unwrap_or_else(|| weights(*of_beam_m)))
+        let sums = spots.map(|(spot, of_beam_m)| {
+            let Some(spot) = spot else { return Sums::default() };
+            let weights = common.unwrap_or_else(|| weights(*of_beam_m));
+            Sums::of(spot, &weights, region, &f, &coherent_share)
         });
-        weighed.collect()
+        sums.collect()
     }
 }
 
@@ -298,25 +289,25 @@ fn spots(stage: &Stage, shots: &[Shot]) -> Spots {
         let range_m = centre.as_ref().map_or(beam.focus_m, |hit| hit.range_m);
         beam.section(range_m).fwhm_m()
     });
-    let of_beam_m = of_beam.collect();
-    Spots { all, divergence_rad: stage.middle_divergence_rad(), of_beam_m, sums: Cache::default() }
+    Spots { all, of_beam_m: of_beam.collect(), sums: Cache::default() }
 }
 
 /// Shades the traced rays of a list of shots with some laws.
 fn shaded(survey: &Survey, laws: &[Brdf]) -> Survey {
     let Some(spots) = survey.downcast_ref::<Arc<Spots>>() else { return Box::new(()) };
-    let has_waves = laws.iter().any(|law| returns_wave(law, spots.divergence_rad));
     let (spots, laws) = (spots.clone(), laws.to_vec());
-    let (sums, waves) = (Cache::default(), Cache::default());
-    Box::new(ShadedSpots { spots, laws, sums, has_waves, waves })
+    Box::new(ShadedSpots { spots, laws, sums: Cache::default() })
 }
 
-/// Averages the echoes of some shots over spots of a diameter.
-fn average(diameter: Diameter, shaded: &Survey, arrived: &mut [Option<MeanEcho>]) {
+/// Averages the echoes of some shots over spots of a diameter, as a range receiver reads them where there is one.
+fn average(
+    diameter: Diameter,
+    cell: Option<RangeCell>,
+    shaded: &Survey,
+    arrived: &mut [Option<MeanEcho>],
+) {
     let Some(shaded) = shaded.downcast_ref::<ShadedSpots>() else { return };
     let answers = shaded.answers(diameter);
-    let make = || shaded.spots.coherent_w(diameter, &shaded.laws);
-    let waves = shaded.has_waves.then(|| shaded.waves.get_or_make(diameter.key(), make));
     arrived.par_iter_mut().enumerate().for_each(|(shot, one)| {
         let sums = answers.iter().filter_map(|(level, of)| Some((*level, of.get(shot)?)));
         let sums = sums.fold(Sums::default(), |sums, (level, of)| sums.and(level, of));
@@ -325,9 +316,20 @@ fn average(diameter: Diameter, shaded: &Survey, arrived: &mut [Option<MeanEcho>]
             one.power_w = averaged.mean_w * gain.clamp(1.0 / MOST_GAIN, MOST_GAIN);
             one.range_m += averaged.longer_m;
             one.spread_m = one.spread_m.hypot(averaged.spread_m);
-            one.coherent_share = waves.as_ref().map_or(0.0, |waves| waves[shot] / averaged.mean_w);
+            one.coherent_share = averaged.coherent_share;
+            if let Some(cell) = cell {
+                *one = read_peak(&cell, *one);
+            }
         }
     });
+}
+
+/// An echo as a range receiver reads it: of what speckles, the strongest peak. A wave has one range.
+fn read_peak(cell: &RangeCell, echo: MeanEcho) -> MeanEcho {
+    let [part, more_looks] = cell.peak(echo.spread_m);
+    let share = echo.coherent_share + (1.0 - echo.coherent_share) * part;
+    let coherent_share = echo.coherent_share / share;
+    MeanEcho { power_w: share * echo.power_w, coherent_share, more_looks, ..echo }
 }
 
 /// One ray of the spot of a beam, where it hits; `facets` may be empty.
@@ -394,6 +396,8 @@ struct SpotMean {
     /// What adds to the range, and its spread, m.
     longer_m: f64,
     spread_m: f64,
+    /// Share of the mean that is one wave.
+    coherent_share: f64,
 }
 
 /// Spots may be oval and have a foot: both axes of one whose axes are as 1 to 1.4 are within a sixth of their mean. Two of these
@@ -453,7 +457,7 @@ impl Effect for FiniteSpot {
 
     fn arrive(&self, values: &[f64], shaded: &Survey, arrived: &mut [Option<MeanEcho>]) {
         if let Some(&diameter_m) = values.first() {
-            average(Diameter::Of(diameter_m), shaded, arrived);
+            average(Diameter::Of(diameter_m), None, shaded, arrived);
         }
     }
 }
@@ -486,7 +490,7 @@ impl Effect for BeamSpot {
     }
 
     fn arrive(&self, _: &[f64], shaded: &Survey, arrived: &mut [Option<MeanEcho>]) {
-        average(Diameter::OfBeam, shaded, arrived);
+        average(Diameter::OfBeam, self.cell, shaded, arrived);
     }
 }
 
@@ -522,9 +526,16 @@ mod tests {
         };
         let alone = echoes(Vec::new());
         let averaged = echoes(vec![(&FiniteSpot as &dyn Effect, vec![0.016])]);
-        for (a, b) in alone.iter().flatten().zip(averaged.iter().flatten()) {
-            assert!((a.coherent_share - 0.5).abs() < 0.02, "{a:?}");
-            assert!((b.coherent_share - 0.5).abs() < 0.02, "{b:?}");
+        // Off the middle of the field the beam is wider, and diverges less.
+        let is_near = |index: &usize| {
+            let shot = &bench.shots[*index];
+            shot.xt_m.hypot(shot.yt_m) < 0.03
+        };
+        let near: Vec<usize> = (0..bench.shots.len()).filter(is_near).collect();
+        assert!(!near.is_empty());
+        for echo in near.into_iter().flat_map(|index| [alone[index], averaged[index]]) {
+            let share = echo.unwrap().coherent_share;
+            assert!((share - 0.5).abs() < 0.02, "{share}");
         }
     }
 
@@ -549,7 +560,7 @@ mod tests {
     fn the_spot_of_the_beam_is_one_of_its_diameter() {
         let bench = Bench::sphere();
         let diameter_m = bench.stage().geometry.radar.spot_fwhm_m();
-        let own = bench.with(&BeamSpot { diameter_m }, &[]);
+        let own = bench.with(&BeamSpot { diameter_m, cell: None }, &[]);
         let given = bench.with(&FiniteSpot, &[diameter_m]);
         for (shot, (own, given)) in bench.shots.iter().zip(own.iter().zip(given)) {
             // Off the middle of the field the beam is wider.
@@ -572,8 +583,7 @@ mod tests {
         let over_a_border = (ray(0, 0.1), vec![ray(0, 0.2), ray(1, 0.3), ray(1, 0.05)]);
         let all = vec![Some(over_a_border), None, Some((ray(1, 0.2), vec![ray(1, 0.25)]))];
         let of_beam_m = vec![0.02; all.len()];
-        let (divergence_rad, sums) = (0.01, Cache::default());
-        let spots = Arc::new(Spots { all: all.clone(), divergence_rad, of_beam_m, sums });
+        let spots = Arc::new(Spots { all: all.clone(), of_beam_m, sums: Cache::default() });
         let law = |f_lambda: f64, m: f64| paint(CookTorrance { f_lambda, m, ..lobe() });
         let tabled = Brdf::Lambert(Lambert { albedo: 0.5 });
         let first = [law(0.2, 0.2), law(0.1, 0.3)];
@@ -593,18 +603,16 @@ mod tests {
                     continue;
                 };
                 let fresh = (0..).zip(laws).fold(Sums::default(), |sums, (region, law)| {
-                    sums.and(
-                        1.0,
-                        &Sums::of(spot, &weights(0.02), region, |beam_rad, v| {
-                            law.seen_by(beam_rad, v, v).f_per_sr
-                        }),
-                    )
+                    let f = |beam_rad, v| law.seen_by(beam_rad, v, v).f_per_sr;
+                    let share = |beam_rad, v| law.seen_by(beam_rad, v, v).coherent_share;
+                    sums.and(1.0, &Sums::of(spot, &weights(0.02), region, f, share))
                 });
                 for (kept, fresh) in [
                     (kept.centre_w, fresh.centre_w),
                     (kept.power_w, fresh.power_w),
                     (kept.first, fresh.first),
                     (kept.second, fresh.second),
+                    (kept.coherent_w, fresh.coherent_w),
                 ] {
                     assert!((kept - fresh).abs() <= 1e-12 * fresh.abs(), "{kept} {fresh}");
                 }

@@ -17,6 +17,7 @@ use crate::brdf::{Brdf, Distribution, NarrowLobe, Scattering, Seen};
 use crate::effects::echo::MeanEcho;
 use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level, Setting, Survey};
 use crate::effects::intersection::{local_frame, shot_along};
+use crate::effects::range_cell::RangeCell;
 use crate::effects::shot::{Shot, Stage};
 use crate::effects::spread::sunflower;
 use crate::frames::{Direction, Point, Ray, Surface};
@@ -32,11 +33,14 @@ pub(crate) struct SecondBounce {
     pub outside_spot: f64,
     /// Whether both ways round a pair of surfaces add as waves, which doubles what is not coherent.
     pub in_phase: bool,
+    /// How a range receiver reads them: a path adds to the peak of the first surface as far as it is as long. None
+    /// without one.
+    pub cell: Option<RangeCell>,
 }
 
 impl SecondBounce {
     /// What is assumed without `[bounce]`.
-    const ASSUMED: SecondBounce = SecondBounce { outside_spot: OUTSIDE_SPOT, in_phase: false };
+    const ASSUMED: SecondBounce = SecondBounce { outside_spot: OUTSIDE_SPOT, in_phase: false, cell: None };
 }
 
 /// A coupling that counts as none, dB.
@@ -283,16 +287,28 @@ impl Effect for MultiBounce {
 
     fn arrive(&self, values: &[f64], shaded: &Survey, arrived: &mut [Option<MeanEcho>]) {
         let &[coupling_db, reach_m] = values else { return };
-        add(ratio_from_db(coupling_db), reach_m, shaded, arrived);
+        add(ratio_from_db(coupling_db), reach_m, None, shaded, arrived);
     }
 }
 
-/// Adds what comes by way of second surfaces, times a ratio, through an antenna of a reach, m.
-fn add(coupling: f64, reach_m: f64, shaded: &Survey, arrived: &mut [Option<MeanEcho>]) {
+/// Adds what comes by way of second surfaces, times a ratio, through an antenna of a reach, m, and to a range receiver's peak.
+fn add(
+    coupling: f64,
+    reach_m: f64,
+    cell: Option<RangeCell>,
+    shaded: &Survey,
+    arrived: &mut [Option<MeanEcho>],
+) {
     let all = shaded.downcast_ref::<Vec<Vec<Bounce>>>().map_or(&[][..], Vec::as_slice);
     all.par_iter().zip(arrived).for_each(|(bounces, one)| {
-        let seen = bounces.iter().map(|bounce| bounce.seen(reach_m)).reduce(MeanEcho::with);
-        if let (Some(one), Some(seen)) = (one, seen) {
+        let Some(one) = one else { return };
+        let part = |echo: MeanEcho| match cell {
+            Some(cell) => cell.response(echo.range_m - one.range_m) * echo.power_w,
+            None => echo.power_w,
+        };
+        let seen = bounces.iter().map(|bounce| bounce.seen(reach_m));
+        let read = seen.map(|echo| MeanEcho { power_w: part(echo), ..echo });
+        if let Some(seen) = read.reduce(MeanEcho::with) {
             *one = one.with(MeanEcho { power_w: coupling * seen.power_w, ..seen });
         }
     });
@@ -327,7 +343,7 @@ impl Effect for SecondBounce {
     }
 
     fn arrive(&self, _: &[f64], shaded: &Survey, arrived: &mut [Option<MeanEcho>]) {
-        add(1.0, 0.0, shaded, arrived);
+        add(1.0, 0.0, self.cell, shaded, arrived);
     }
 }
 
@@ -390,7 +406,7 @@ mod tests {
         let corner = Bench::of(dihedral());
         let bare = corner.bare();
         let added_w = |outside_spot, in_phase| -> f64 {
-            let with = corner.with(&SecondBounce { outside_spot, in_phase }, &[]);
+            let with = corner.with(&SecondBounce { outside_spot, in_phase, cell: None }, &[]);
             with.iter().zip(&bare).map(|(with, bare)| with.power_w - bare.power_w).sum()
         };
         let assumed_w: f64 =
