@@ -635,16 +635,14 @@ fn what_cannot_transmit_is_refused_in_a_sentence() {
         assert!(text.contains(expected), "{more}: {text}");
         assert!(!folder.path().join("out").exists(), "{text}");
     }
-    // A diagnosis and a measurement know one surface.
+    // A measurement knows one surface.
     let file = scene(folder.path(), "", "kapton", "transmits = true");
     matdb(folder.path()).args(["render", "-q", "-o", "out"]).arg(&file).assert().success();
     let cloud = folder.path().join("out/cloud.ply");
-    for command in ["diagnose", "measure"] {
-        let mut run = matdb(folder.path());
-        let text =
-            refused(run.arg(command).arg(&cloud).arg("--scene").arg(&file).args(["-o", "why"]));
-        assert!(text.contains("transmits"), "{text}");
-    }
+    let mut run = matdb(folder.path());
+    let text =
+        refused(run.arg("measure").arg(&cloud).arg("--scene").arg(&file).args(["-o", "why"]));
+    assert!(text.contains("transmits"), "{text}");
 }
 
 #[test]
