@@ -226,8 +226,8 @@ impl Problem<'_> {
     }
 }
 
-/// Sum of the products of the shots' scores, by slopes of one or of two widths. Powers that share speckle count for less, ranges do not. Without it both
-/// are one score.
+/// Sum of the products of the shots' scores, by slopes of one or of two widths. Powers that share speckle count for less,
+/// ranges do not. Without shared speckle both are one score.
 fn products(terms: &[Term], [one, other]: [&[Vec<Slope>]; 2]) -> DMatrix<f64> {
     DMatrix::from_fn(one.len(), one.len(), |i, j| {
         let pairs = terms.iter().zip(one[i].iter().zip(&other[j]));

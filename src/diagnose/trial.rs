@@ -230,10 +230,10 @@ impl<'p> Search<'p> {
         let mut has_far_start = false;
         let far = if is_first || screen.leaves_laws_open {
             let declared = state.space.restarted(&state.fit.at);
-            likeliest_start(screen, &declared, &space, effect, &values)
-                .and_then(|best| likeliest_strength(screen, &best, &space, effect))
+            likeliest(screen, &space, &joined(&declared, effect, &values))
+                .and_then(|best| likeliest(screen, &space, &of_all_strengths(effect, &best)))
         } else if most < least && !is_absent {
-            likeliest_beside_laws(screen, &state.fit.at, &space, effect, &values)
+            likeliest_beside_laws(screen, &space, effect, joined(&state.fit.at, effect, &values))
         } else {
             None
         };
@@ -416,56 +416,34 @@ fn is_at_rest(fit: &Fit, effect: &dyn Effect) -> bool {
     fit.is_stuck && !effect.moves()
 }
 
-/// The likeliest start beside a point of the model so far.
-fn likeliest_start(
-    screen: &Screen,
-    at: &DVector<f64>,
-    space: &Space,
-    effect: &dyn Effect,
-    values: &[Vec<f64>],
-) -> Option<DVector<f64>> {
-    let starts = values.iter().map(|values| Space::joined(at, effect, values));
-    likeliest(screen, space, starts)
+/// The starts of an effect, with the model so far at a point.
+fn joined(at: &DVector<f64>, effect: &dyn Effect, values: &[Vec<f64>]) -> Vec<DVector<f64>> {
+    values.iter().map(|values| Space::joined(at, effect, values)).collect()
+}
+
+/// The likeliest of some starts.
+fn likeliest(screen: &Screen, space: &Space, starts: &[DVector<f64>]) -> Option<DVector<f64>> {
+    let gains = starts.iter().map(|start| (screen.gain(space, start), start));
+    gains.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, at)| at.clone())
 }
 
 /// The likeliest start where the model so far follows it: an error of the angle fits none whose lobes are as wide already as
 /// both together.
 fn likeliest_beside_laws(
     screen: &Screen,
-    at: &DVector<f64>,
     space: &Space,
     effect: &dyn Effect,
-    values: &[Vec<f64>],
+    starts: Vec<DVector<f64>>,
 ) -> Option<DVector<f64>> {
-    let held: Vec<usize> = (at.len()..at.len() + effect.parameters().len()).collect();
-    let mut starts: Vec<(f64, DVector<f64>)> = values
-        .iter()
-        .map(|values| Space::joined(at, effect, values))
-        .map(|start| (screen.gain(space, &start), start))
-        .collect();
+    let mut starts: Vec<(f64, DVector<f64>)> =
+        starts.into_iter().map(|start| (screen.gain(space, &start), start)).collect();
     starts.sort_by(|a, b| b.0.total_cmp(&a.0));
     starts.truncate(FOLLOWED_BY_LAWS);
-    let fits = starts.iter().map(|(_, start)| screen.problem.fit(space, start, &held, &FOLLOW));
+    let fits = starts.iter().map(|(_, start)| {
+        let held: Vec<usize> = (start.len() - effect.parameters().len()..start.len()).collect();
+        screen.problem.fit(space, start, &held, &FOLLOW)
+    });
     fits.max_by(|a, b| a.ln_likelihood.total_cmp(&b.ln_likelihood)).map(|fit| fit.at)
-}
-
-/// The likeliest strength of a start.
-fn likeliest_strength(
-    screen: &Screen,
-    start: &DVector<f64>,
-    space: &Space,
-    effect: &dyn Effect,
-) -> Option<DVector<f64>> {
-    likeliest(screen, space, of_all_strengths(effect, start).into_iter())
-}
-
-fn likeliest(
-    screen: &Screen,
-    space: &Space,
-    starts: impl Iterator<Item = DVector<f64>>,
-) -> Option<DVector<f64>> {
-    let gains = starts.map(|start| (screen.gain(space, &start), start));
-    gains.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, at)| at)
 }
 
 /// A start with its effect in each of [`STRENGTHS`].

@@ -400,8 +400,8 @@ struct SpotMean {
     coherent_share: f64,
 }
 
-/// Spots may be oval and have a foot: both axes of one whose axes are as 1 to 1.4 are within a sixth of their mean. Two of these
-/// errors cover that.
+/// Spots may be oval: both axes of one whose axes are as 1 to 1.4 are within a sixth of their mean. Two of these errors
+/// cover that.
 const FORM_ERROR: f64 = 0.1;
 
 const ABOUT: About = About {
