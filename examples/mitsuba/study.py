@@ -12,6 +12,7 @@ import time
 
 import diagnoses
 import generate
+import page
 import score
 import sets
 
@@ -49,18 +50,10 @@ def scored(folder, index, seed, program):
     return result, done
 
 
-def row(what, count, total, target, met, complete):
-    share = f"{100 * count / total:5.1f} %" if total else "   -   "
-    words = ("met" if met else "MISSED") if complete else "not all done"
-    print(f"  {what:44} {count:4} of {total:<5} {share}   {target:12} {words}")
-
-
-def table(scores, done):
-    """One line for each target. `scores` and `done` are by the name of the set."""
-    size = {name: count for _, name, count, _ in sets.SETS}
-
-    def whole(names):
-        return all(done[n] == size[n] for n in names)
+def targets(scores, done):
+    """What each target asks, how many came out so, of how many, the target, and whether it is met. `scores` and `done`
+    are by the name of the set."""
+    size, rows = {name: count for _, name, count, _ in sets.SETS}, []
 
     def merged(names):
         result = score.Score()
@@ -68,14 +61,18 @@ def table(scores, done):
             result.update(scores[name])
         return result
 
+    def row(what, names, count, total, target, met):
+        complete = all(done[n] == size[n] for n in names)
+        rows.append((what, count, total, target, ("met" if met else "MISSED") if complete else "not all done"))
+
     def rate(what, names, kind, least):
         s = merged(names)
-        row(what, s.right[kind], s.total[kind], f">= {least} %", 100 * s.right[kind] >= least * s.total[kind], whole(names))
+        row(what, names, s.right[kind], s.total[kind], f">= {least} %", 100 * s.right[kind] >= least * s.total[kind])
 
     def at_most(what, names, most):
         s = merged(names)
         wrong = s.total["complete"] - s.right["complete"]
-        row(what, wrong, s.total["complete"], f"<= {most}", wrong <= most, whole(names))
+        row(what, names, wrong, s.total["complete"], f"<= {most}", wrong <= most)
 
     strengths = ["strong", "moderate", "weak"]
     judged = [name for part, name, _, _ in sets.SETS if part == "mitsuba"]
@@ -86,12 +83,12 @@ def table(scores, done):
     rate("unknown called unexplained", ["unknown"], "unknown", 95)
     s = merged(complete)
     wrong = s.total["complete"] - s.right["complete"]
-    row("false alarms on complete scans", wrong, s.total["complete"], "<= 3 %", 100 * wrong <= 3 * s.total["complete"], whole(complete))
+    row("false alarms on complete scans", complete, wrong, s.total["complete"], "<= 3 %", 100 * wrong <= 3 * s.total["complete"])
     s = merged(judged)
     for what, of_laws in (("95 % intervals of effects that hold", False), ("95 % intervals of laws and level that hold", True)):
         names = [n for n in s.stated if n.startswith("law.") == of_laws]
         held, stated = (sum(c[n] for n in names) for c in (s.held, s.stated))
-        row(what, held, stated, ">= 90 %", 10 * held >= 9 * stated, whole(judged))
+        row(what, judged, held, stated, ">= 90 %", 10 * held >= 9 * stated)
     short = [name for part, name, _, _ in sets.SETS if part == "alarms" and name != "alarms-long"]
     for name in short:
         at_most(f"false alarms, {name.removeprefix('alarms-')}", [name], 5)
@@ -99,7 +96,8 @@ def table(scores, done):
     at_most("false alarms, 18 529 chirps", ["alarms-long"], 1)
     s = merged(strengths + ["pairs"])
     for kind in ("below weak", "not in the data"):
-        print(f"  {kind}, which have no target: {s.right[kind]} of {s.total[kind]} right")
+        rows.append((f"{kind}, right", s.right[kind], s.total[kind], "none", ""))
+    return rows
 
 
 def main():
@@ -114,6 +112,7 @@ def main():
     parser.add_argument("--jobs", type=int, default=2, help="cases at once")
     parser.add_argument("--count", type=int, default=10**6, help="only the first cases of each set")
     parser.add_argument("--minutes", type=float, default=1e6, help="begin no case after this time")
+    parser.add_argument("--page", help="write what is done as a page of the book, too")
     parser.add_argument("--strict", action="store_true", help="exit with 1 unless every case that is done is right")
     arguments = parser.parse_args()
     ours = [name for part, name, _, _ in sets.SETS if part == arguments.part]
@@ -140,7 +139,12 @@ def main():
     everything.print()
     print(f"judged: {program}; cases by {generate.generator()}, seed {arguments.seed}")
     print("done: " + ", ".join(f"{name} {done[name]} of {count}" for _, name, count, _ in sets.SETS))
-    table(scores, done)
+    rows = targets(scores, done)
+    for what, count, total, target, met in rows:
+        print(f"  {what:44} {count:4} of {total:<5} {page.percent(count, total):>8}   {target:12} {met}")
+    if arguments.page:
+        with open(arguments.page, "w") as file:
+            file.write(page.page(rows, scores, done, f"{program}; cases by {generate.generator()}, seed {arguments.seed}"))
     if arguments.strict and (not everything.total or everything.right != everything.total):
         raise SystemExit(1)
 
