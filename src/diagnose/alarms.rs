@@ -48,8 +48,8 @@ const LEVELS_DB: std::ops::RangeInclusive<i32> = -12..=12;
 pub struct Alarms {
     /// Powers of false alarms, W.
     pub powers_w: Vec<f64>,
-    /// How many others lie near the target by chance, and are among the strays.
-    pub near_target: f64,
+    /// Length of the gate near the target, m, on average of the chirps that miss it: false alarms there are among the strays.
+    pub near_m: f64,
     /// Number of false alarms of chirps that meet the target, where only the first detection is reported: an echo ends
     /// the search, so that they do not tell the noise.
     pub of_target: usize,
@@ -68,6 +68,8 @@ pub struct Alarms {
     pub looks: f64,
     /// Range cells of the gate; none where it is not declared.
     pub cells: Option<f64>,
+    /// Length of a range cell, m.
+    pub cell_m: f64,
     /// How much they count: 1, or less beside a sample of the chirps on the target.
     pub weight: f64,
 }
@@ -172,13 +174,31 @@ impl Alarms {
         let Some(cells) = self.cells else {
             return Gate { cells: self.likely_cells(cell, threshold_w), away: 1.0 };
         };
-        let of_misses = self.of_misses.len() as f64;
-        let away = if of_misses > 0.0 { of_misses / (of_misses + self.near_target) } else { 1.0 };
+        let away = self.gate_m().map_or(1.0, |gate_m| 1.0 - (self.near_m / gate_m).min(MOST_NEAR));
         match self.returns {
             Returns::Strongest => Gate { cells, away },
             // Each cell for itself.
             Returns::First | Returns::All => Gate { cells: away * cells, away: 1.0 },
         }
+    }
+
+    /// Length of the gate, m: as declared, or at least that over which false alarms lie, whose ranges are all alike; none where
+    /// neither tells it.
+    pub(super) fn gate_m(&self) -> Option<f64> {
+        const LEAST: usize = 10;
+        let count = self.of_misses.len();
+        let ranges_m = self.of_misses.iter().map(|(_, range_m)| *range_m);
+        let nearest_m = ranges_m.clone().fold(f64::INFINITY, f64::min);
+        let span_m = ranges_m.fold(0.0, f64::max) - nearest_m;
+        let by_alarms_m =
+            if count < LEAST { 0.0 } else { span_m * (count + 1) as f64 / (count - 1) as f64 };
+        let declared_m = self.cells.map_or(0.0, |cells| cells * self.cell_m);
+        Some(declared_m.max(by_alarms_m)).filter(|length_m| *length_m > 0.0)
+    }
+
+    /// How many false alarms lie near the target by chance, where others do not.
+    pub(super) fn near_target(&self) -> f64 {
+        self.of_misses.len() as f64 * self.gate_m().map_or(0.0, |gate_m| odds(self.near_m / gate_m))
     }
 
     /// The likeliest number of cells.
@@ -250,6 +270,15 @@ impl Alarms {
 /// How many of some detections are more than chance has where it is expected to have so many.
 pub(super) fn beyond_chance(count: usize, expected: f64) -> usize {
     count.saturating_sub((expected + 3.0 * expected.sqrt()).round() as usize)
+}
+
+/// Largest share of a gate near the target: none tells the noise.
+const MOST_NEAR: f64 = 0.999;
+
+/// How many lie in a part of a gate where one lies in the others.
+pub(super) fn odds(share: f64) -> f64 {
+    let share = share.min(MOST_NEAR);
+    share / (1.0 - share)
 }
 
 /// Range cells of a gate, and the share of them away from the target.
@@ -356,7 +385,7 @@ mod tests {
             number += 1;
             number % 4 != 0
         });
-        alarms.near_target = (number - alarms.powers_w.len()) as f64;
+        (alarms.cell_m, alarms.near_m) = (0.01, 0.1);
         let chirps = Chirps::draw(&Radar::default(), |_| Err("no file".to_owned())).unwrap();
         let shot = Shot::missed(&chirps, 0, 0.0);
         alarms.of_misses = vec![(shot, 8.0); alarms.powers_w.len()];

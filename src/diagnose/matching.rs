@@ -6,7 +6,7 @@ use std::ops::Range;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::alarms::{Alarms, MOST_OVER_THRESHOLD};
+use super::alarms::{Alarms, MOST_OVER_THRESHOLD, odds};
 use super::error::DiagnoseError;
 use super::observation::{NO_LIMIT_W, Observation};
 use crate::effects::{Antenna, BeamSpot, Model, Shot, Stage};
@@ -407,7 +407,7 @@ impl Scan<'_> {
             Returns::First => alarms.silent_misses,
             Returns::All => self.chirps.rays.len(),
         };
-        alarms.near_target = expected_near(&missing, &alarms.of_misses, target.as_ref());
+        alarms.near_m = length_near_m(&missing, shots, target.as_ref());
         let cloud_match = CloudMatch { observations, strays, alarms };
         Assignment { cloud_match, on_target, second }
     }
@@ -441,47 +441,35 @@ fn is_past_an_edge(point: &CloudPoint, shot: &Shot, target: Option<&Nearest>) ->
     nearest_m <= GATE_M && off_ray_m(point, &shot.ray).length() <= ON_RAY_M
 }
 
-/// How many false alarms lie near the target by chance, where others at these ranges, m, do not: noise reports any range
-/// alike.
-fn expected_near(
-    missing: &[&Ray<Global>],
-    alarms: &[(Shot, f64)],
-    target: Option<&Nearest>,
-) -> f64 {
-    let Some((target, ranges_m)) = target.zip(ranges_of_gate(alarms)) else { return 0.0 };
+/// Length of rays near the target that miss it, on average, m.
+fn length_near_m(missing: &[&Ray<Global>], shots: &[Shot], target: Option<&Nearest>) -> f64 {
+    /// Places that are tried on each ray.
+    const PLACES: usize = 32;
+    let Some(target) = target else { return 0.0 };
+    let ranges_m = shots.iter().map(|shot| shot.hit.range_m);
+    let from_m = ranges_m.clone().fold(f64::INFINITY, f64::min) - GATE_M;
+    let step_m = (ranges_m.fold(0.0, f64::max) + GATE_M - from_m) / PLACES as f64;
     let near = missing.par_iter().map(|ray| {
-        let places = ranges_m.iter().map(|range_m| ray.origin.xyz + *range_m * ray.direction.xyz());
+        let at_m = |step: usize| from_m + (step as f64 + 0.5) * step_m;
+        let places = (0..PLACES).map(|step| ray.origin.xyz + at_m(step) * ray.direction.xyz());
         places.filter(|place| target.find(*place).1 <= GATE_M).count()
     });
-    let near = near.sum::<usize>() as f64 / (RANGES * missing.len().max(1)) as f64;
-    alarms.len() as f64 * near / (1.0 - near).max(1e-3)
+    step_m * near.sum::<usize>() as f64 / missing.len().max(1) as f64
 }
 
-/// How many false alarms lie beside an edge by chance, where others do not.
-pub(super) fn expected_beside_edge(alarms: &[(Shot, f64)], model: &Model, stage: &Stage) -> f64 {
-    let Some(ranges_m) = ranges_of_gate(alarms) else { return 0.0 };
+/// How many false alarms lie beside an edge by chance, where others do not; 0 where the length of the gate is unknown.
+pub(super) fn expected_beside_edge(alarms: &Alarms, model: &Model, stage: &Stage) -> f64 {
+    let Some(gate_m) = alarms.gate_m() else { return 0.0 };
     let beam = own_beam(stage);
     let model = with_own_beam(model, &beam);
-    let chances = alarms.par_iter().map(|(shot, _)| {
-        let edges_m = model.ranges_m(stage, shot);
-        let is_near = |m: &&f64| edges_m.iter().any(|edge_m| (edge_m - **m).abs() <= GATE_M);
-        let near = ranges_m.iter().filter(is_near).count() as f64 / RANGES as f64;
-        near / (1.0 - near).max(1e-3)
+    let chances = alarms.of_misses.par_iter().map(|(shot, _)| {
+        let mut edges_m = model.ranges_m(stage, shot);
+        edges_m.sort_by(f64::total_cmp);
+        let apart_m = edges_m.windows(2).map(|pair| (pair[1] - pair[0]).min(2.0 * GATE_M));
+        let near_m = apart_m.sum::<f64>() + if edges_m.is_empty() { 0.0 } else { 2.0 * GATE_M };
+        odds(near_m / gate_m)
     });
     chances.sum()
-}
-
-/// Ranges of a gate that are tried on each ray.
-const RANGES: usize = 16;
-
-/// Ranges, m, evenly over where false alarms lie; none for too few of them.
-fn ranges_of_gate(alarms: &[(Shot, f64)]) -> Option<[f64; RANGES]> {
-    const LEAST: usize = 10;
-    let ranges_m = alarms.iter().map(|(_, range_m)| *range_m);
-    let nearest_m = ranges_m.clone().fold(f64::INFINITY, f64::min);
-    let step_m = (ranges_m.fold(0.0, f64::max) - nearest_m) / RANGES as f64;
-    let all_m = std::array::from_fn(|step| nearest_m + (step as f64 + 0.5) * step_m);
-    (alarms.len() >= LEAST).then_some(all_m)
 }
 
 /// The radar's own beam, which reads ranges as a radar without a range receiver does.

@@ -228,9 +228,9 @@ impl StrayCounts {
                     off_target += is_missed;
                 }
             }
-            let by_chance = expected_beside_edge(&alarms.of_misses, &model, stage);
+            let by_chance = expected_beside_edge(alarms, &model, stage);
             counts.past_the_spot += beyond_chance(past_the_spot, by_chance);
-            counts.off_target += beyond_chance(off_target, alarms.near_target);
+            counts.off_target += beyond_chance(off_target, alarms.near_target());
         }
         let points = subject.strays.iter().map(Vec::len).sum::<usize>() + subject.detected();
         if counts.off_target as f64 > MOST_STRAYS * points as f64 {

@@ -103,6 +103,7 @@ pub fn diagnose_together(
             match_cloud(cloud, chirps, &own, threshold_w, radar.returns, antenna)?
         };
         matched.alarms.cells = radar.gate_cells();
+        matched.alarms.cell_m = radar.chirp().range_resolution_m();
         matched.alarms.looks = radar.noise_looks();
         let of_strays = matched.strays.iter_mut().filter_map(|stray| stray.shot.as_mut());
         own.iter_mut().chain(of_strays).for_each(|shot| shot.scan = number as u16);
