@@ -6,12 +6,13 @@ use super::clouds::parts;
 use super::explanation::{Addition, Explanation};
 use super::folds::Folds;
 use super::report::{Base, BaseValue, BeforeAfter, CloudPart, FoundEffect, Parameters, Row, Value};
+use super::residual::{FORM_OF_SCATTER, ResidualStructure};
 use super::score::{AT_THE_FLOOR, DB, Errors, errors};
 use super::scorer::{Scorer, State};
 use super::subject::Subject;
 use super::views::Views;
 use crate::brdf::Brdf;
-use crate::effects::{Effect, Prediction, Shot};
+use crate::effects::{Effect, Prediction, Receiver, Shot};
 
 /// A model as the table of residuals shows it.
 #[derive(Clone, Copy)]
@@ -82,14 +83,24 @@ pub(super) fn base(subject: &Subject, state: &State, sd: &[f64]) -> Base {
     }
 }
 
-/// The effects of a model with their parameters; `sd`: standard deviations of all unknowns.
-pub(super) fn effects(model: &Explanation, sd: &[f64], shots: &[Shot]) -> Vec<FoundEffect> {
+/// The effects of a model with their parameters; `sd`: standard deviations of all unknowns. Where the form of the scatter is
+/// not the model's, those of effects on it mean nothing and are not stated.
+pub(super) fn effects(
+    model: &Explanation,
+    sd: &[f64],
+    shots: &[Shot],
+    unexplained: &[ResidualStructure],
+) -> Vec<FoundEffect> {
+    let has_other_form = unexplained.iter().any(|one| one.covariate == FORM_OF_SCATTER);
     let Explanation { state, added } = model;
     let mut rest = sd.iter().skip(state.space.base_len());
     let mut effects = Vec::new();
     let values = state.space.effect_values(&state.fit.at);
     for ((effect, values), added) in state.space.effects.iter().zip(values).zip(added) {
-        let sd: Vec<f64> = rest.by_ref().take(values.len()).copied().collect();
+        let mut sd: Vec<f64> = rest.by_ref().take(values.len()).copied().collect();
+        if has_other_form && effect.receive(&values, Receiver::LINEAR) != Receiver::LINEAR {
+            sd.fill(f64::INFINITY);
+        }
         effects.push(found(*effect, &values, &sd, added, shots));
     }
     effects
@@ -107,7 +118,7 @@ fn found(
     for (number, ((known, &value), sd)) in
         effect.parameters().iter().zip(values).zip(sd).enumerate()
     {
-        let sd = finite((sd * known.step).hypot(effect.form_error(number, value)));
+        let sd = finite((sd * known.step).hypot(effect.form_error(number, values)));
         numbers.insert(known.name, Value { value, sd, unit: known.unit });
     }
     FoundEffect {

@@ -120,8 +120,8 @@ impl Effect for InScans<'_> {
         twists
     }
 
-    fn form_error(&self, parameter: usize, value: f64) -> f64 {
-        self.effect.form_error(parameter, value)
+    fn form_error(&self, parameter: usize, values: &[f64]) -> f64 {
+        self.effect.form_error(parameter, values)
     }
 
     fn vectors(&self) -> &'static [(&'static str, [usize; 3])] {

@@ -102,16 +102,23 @@ struct Assignment {
     on_target: usize,
     /// Further detections of chirps that already have one.
     second: usize,
+    /// Number of chirps that meet the target, and of those that miss it.
+    sent: [usize; 2],
 }
 
 impl Assignment {
-    /// Whether most of the cloud is of the target. False alarms are nobody's, as long as they are not the most.
+    /// Whether most of the cloud is of the target. False alarms are nobody's, as long as they are not the most of what chirps
+    /// report that meet the target. Such chirps speak no less often than others, but for chance.
     fn is_of_target(&self, cloud: &Cloud) -> bool {
         let points = cloud.points().len();
-        let alarms = self.cloud_match.alarms.count();
+        let (alarms, of_misses) =
+            (self.cloud_match.alarms.count(), self.cloud_match.alarms.of_misses.len());
         let others = points - self.on_target;
+        let of_hits = points - of_misses;
+        let [hits, misses] = self.sent;
         (others - alarms.min(others)) as f64 <= MOST_STRAYS * (points - alarms) as f64
-            && alarms <= points / 2
+            && alarms - of_misses <= of_hits / 2
+            && 2 * of_hits * misses >= of_misses * hits
     }
 }
 
@@ -409,7 +416,7 @@ impl Scan<'_> {
         };
         alarms.near_m = length_near_m(&missing, shots, target.as_ref());
         let cloud_match = CloudMatch { observations, strays, alarms };
-        Assignment { cloud_match, on_target, second }
+        Assignment { cloud_match, on_target, second, sent: [shots_of_chirp.len(), missing.len()] }
     }
 }
 

@@ -221,6 +221,9 @@ pub(super) fn outliers(
     })
 }
 
+/// Name of the test of the shape of the scatter.
+pub(super) const FORM_OF_SCATTER: &str = "form of the scatter";
+
 /// Scatter of another shape than declared, such as a speckle that is not Gamma: z is skewed
 /// although mean and spread are right. Its third moment is 0 under the model, with the standard
 /// deviation √(6/n), n the number of independent shots with its scatter; the corresponding displacement is (z² − 1)/6 of it (Cornish and Fisher).
@@ -232,7 +235,7 @@ pub(super) fn skewness(z: &[f64], shared: &SharedSpeckle, sd_db: f64) -> Option<
     let third = inner.iter().map(|z| (z - mean).powi(3)).sum::<f64>() / count;
     let chance = erfc(third.abs() / (6.0 / shared.count_of_cubes(z.len())).sqrt() / SQRT_2);
     (third.abs() > SKEWED && chance < SKEWED_BY_CHANCE).then(|| ResidualStructure {
-        covariate: "form of the scatter".to_owned(),
+        covariate: FORM_OF_SCATTER.to_owned(),
         strength_db: sd_db * SQRT_2 * third.abs() / 6.0,
         p_value: chance,
     })

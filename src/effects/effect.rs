@@ -171,8 +171,8 @@ pub trait Effect: Sync {
     /// Changes the mean powers and ranges of all shots by a shaded survey. It is called after all gains.
     fn arrive(&self, _values: &[f64], _shaded: &Survey, _echoes: &mut [Option<MeanEcho>]) {}
 
-    /// How far a parameter of this value may be off because the real effect has another form than this one.
-    fn form_error(&self, _parameter: usize, _value: f64) -> f64 {
+    /// How far a parameter may be off because the real effect has another form than this one.
+    fn form_error(&self, _parameter: usize, _values: &[f64]) -> f64 {
         0.0
     }
 

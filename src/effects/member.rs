@@ -147,8 +147,8 @@ impl Effect for Member {
         whole!(self.arrive(values, shaded, echoes));
     }
 
-    fn form_error(&self, parameter: usize, value: f64) -> f64 {
-        self.whole.form_error(self.used[parameter], value)
+    fn form_error(&self, parameter: usize, values: &[f64]) -> f64 {
+        self.whole.form_error(self.used[parameter], &self.whole_values(values))
     }
 
     fn receive(&self, values: &[f64], receiver: Receiver) -> Receiver {

@@ -97,8 +97,15 @@ impl Registration {
         }
         let point_rays = rays_to_points(cloud, radar, chirps)?;
         let view = View::new(mesh, &chirps.rays, cloud, &point_rays);
-        let rough = start::rough_pose(&view, self)?;
         let along_ray = self.metric == Metric::AlongRay;
+        if let Start::Given(given) = &self.start
+            && self.keep_given
+            && along_ray
+            && let Some(kept) = self.kept(&view, given)
+        {
+            return Ok(kept);
+        }
+        let rough = start::rough_pose(&view, self)?;
         let still_m = if along_ray { HAND_OVER_M } else { self.still_m };
         let mut aligned = coarse::align(&view, self, rough, still_m)?;
         self.check_near(&view, &rough, &aligned.pose)?;
@@ -111,6 +118,16 @@ impl Registration {
             Start::Given(given) if self.keep_given && found.converged => Ok(found.or_given(&given)),
             _ => Ok(found),
         }
+    }
+
+    /// The given pose, if the points agree with it. The gaps are closed from there, without the coarse loop: where the target
+    /// hardly determines a direction, that may run away along it from the true pose.
+    fn kept(&self, view: &View, given: &Pose<Global, Global>) -> Option<RegistrationResult> {
+        let mut aligned = Alignment { pose: *given, scans: 0, steps: 0, still: false };
+        self.close_along_rays(view, &mut aligned);
+        aligned.still = true;
+        let kept = self.judge(view, &aligned).ok()?.or_given(given);
+        kept.kept.then_some(kept)
     }
 
     /// The second loop: Gauss and Newton on the gaps along the measured rays.
@@ -248,6 +265,7 @@ impl RegistrationResult {
 mod tests {
     use super::*;
     use crate::measure::synthetic::{SyntheticScan, apart, mannequin, pushed};
+    use crate::scene::solids;
 
     /// The pose is known this well at a range noise of 2 mm.
     const NEAR_M: f64 = 0.5e-3;
@@ -314,6 +332,19 @@ mod tests {
         // Five times what the points tell, and far below the range noise.
         let wrong = Pose::from_euler_xyz(DVec3::ZERO, DVec3::new(0.0, 0.0, 5e-4));
         assert!(!run(Start::Given(wrong)).kept);
+    }
+
+    /// What faces the radar is round or flat: about the vertical the points determine no turn.
+    #[test]
+    fn a_given_pose_that_is_right_is_kept_where_a_turn_is_unknown() {
+        let mut mesh = solids::icosphere(0.19, 5);
+        mesh.vertices.iter_mut().for_each(|v| v.y += 0.22);
+        let block = solids::cuboid(DVec3::new(0.32, 0.42, 0.3), 0.02);
+        let first = mesh.vertices.len() as u32;
+        mesh.vertices.extend(block.vertices.iter().map(|v| *v - 0.22 * DVec3::Y));
+        mesh.facets.extend(block.facets.iter().map(|facet| facet.map(|corner| corner + first)));
+        let found = SyntheticScan::of(mesh, 1e-3, 1).register(&Registration::default()).unwrap();
+        assert!(found.kept && found.converged, "{found:?}");
     }
 
     #[test]

@@ -32,8 +32,8 @@ impl Effect for AngleError {
         vec![vec![0.4], vec![1.0], vec![3.0]]
     }
 
-    fn form_error(&self, _parameter: usize, value: f64) -> f64 {
-        FORM_ERROR * value
+    fn form_error(&self, parameter: usize, values: &[f64]) -> f64 {
+        FORM_ERROR * values[parameter]
     }
 
     fn receive(&self, values: &[f64], receiver: Receiver) -> Receiver {

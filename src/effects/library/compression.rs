@@ -55,7 +55,7 @@ impl Effect for Compression {
         starts
     }
 
-    fn form_error(&self, parameter: usize, _value: f64) -> f64 {
+    fn form_error(&self, parameter: usize, _values: &[f64]) -> f64 {
         if parameter == 0 { FORM_ERROR_DB } else { 0.0 }
     }
 

@@ -13,6 +13,9 @@ const OVALS_M: [f64; 2] = [0.1, 0.2];
 /// Least cos θ: a flat layer seen edge-on is as deep as it is wide.
 const LEAST_COS_THETA: f64 = 0.02;
 
+/// Share of the loss by which its mean may be off: cloth is uneven, and its outline is no oval.
+const FORM_ERROR: f64 = 0.1;
+
 const PARAMETERS: [EffectParameter; 10] = [
     EffectParameter::new("loss_db", "dB", [0.0, 30.0], 0.0, 0.5),
     EffectParameter::new("boundary_m", "m", [-3.0, 3.0], 0.0, 0.02),
@@ -73,6 +76,10 @@ impl Effect for CoveringLayer {
     /// Beyond a line; within an oval; and within one of uneven thickness.
     fn members(&self) -> &'static [&'static [usize]] {
         &[&[0, 1, 2], &[0, 3, 4, 5, 6, 7], &[0, 3, 4, 5, 6, 7, 8, 9]]
+    }
+
+    fn form_error(&self, parameter: usize, values: &[f64]) -> f64 {
+        if PARAMETERS[parameter].name == "loss_db" { FORM_ERROR * values[parameter] } else { 0.0 }
     }
 
     /// Lines that cut off a third and two thirds of the shots, from four sides, and ovals that lie on the target.

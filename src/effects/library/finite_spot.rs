@@ -439,8 +439,8 @@ impl Effect for FiniteSpot {
         OUTER * values.first().copied().unwrap_or_default()
     }
 
-    fn form_error(&self, _parameter: usize, value: f64) -> f64 {
-        FORM_ERROR * value
+    fn form_error(&self, parameter: usize, values: &[f64]) -> f64 {
+        FORM_ERROR * values[parameter]
     }
 
     fn survey_key(&self, values: &[f64]) -> Option<Vec<f64>> {

@@ -28,6 +28,10 @@ const SIDES_M: [f64; 2] = [0.05, 0.12];
 /// Levels where it begins, dB.
 const LEVELS_DB: [f64; 2] = [1.0, -1.0];
 
+/// Share of the radius by which its centre and itself may be off: an outline with lobes of 15 %, or cut by an edge, has its middle
+/// elsewhere. Two of these errors cover what was seen.
+const FORM_ERROR: f64 = 0.1;
+
 /// Distance, in widths of the fade, beyond which at most 10⁻⁵ of the level remains.
 const FADED: f64 = 3.0;
 
@@ -104,6 +108,13 @@ const ABOUT: About = About {
 impl Effect for ForeignPatch {
     fn about(&self) -> &About {
         &ABOUT
+    }
+
+    fn form_error(&self, parameter: usize, values: &[f64]) -> f64 {
+        match (PARAMETERS[parameter].name, Patch::new(values)) {
+            ("centre_x_m" | "centre_y_m" | "radius_m", Some(patch)) => FORM_ERROR * patch.radius_m,
+            _ => 0.0,
+        }
     }
 
     /// The cells of two grids over the target that hold a shot, brighter and darker.

@@ -40,7 +40,8 @@ pub(crate) struct SecondBounce {
 
 impl SecondBounce {
     /// What is assumed without `[bounce]`.
-    const ASSUMED: SecondBounce = SecondBounce { outside_spot: OUTSIDE_SPOT, in_phase: false, cell: None };
+    const ASSUMED: SecondBounce =
+        SecondBounce { outside_spot: OUTSIDE_SPOT, in_phase: false, cell: None };
 }
 
 /// A coupling that counts as none, dB.
