@@ -110,7 +110,7 @@ impl Registration {
         let mut aligned = coarse::align(&view, self, rough, still_m)?;
         self.check_near(&view, &rough, &aligned.pose)?;
         if along_ray {
-            self.close_along_rays(&view, &mut aligned);
+            self.close_along_rays(&view, &mut aligned, self.max_steps);
             self.check_near(&view, &rough, &aligned.pose)?;
         }
         let found = self.judge(&view, &aligned)?;
@@ -120,20 +120,21 @@ impl Registration {
         }
     }
 
-    /// The given pose, if the points agree with it. The gaps are closed from there, without the coarse loop: where the target
-    /// hardly determines a direction, that may run away along it from the true pose.
+    /// The given pose, if the points agree with it: a few steps from there do not leave it by more than chance. Where the target
+    /// hardly determines a direction, many steps may run away along it from the true pose.
     fn kept(&self, view: &View, given: &Pose<Global, Global>) -> Option<RegistrationResult> {
+        const FEW: usize = 3;
         let mut aligned = Alignment { pose: *given, scans: 0, steps: 0, still: false };
-        self.close_along_rays(view, &mut aligned);
+        self.close_along_rays(view, &mut aligned, FEW);
         aligned.still = true;
         let kept = self.judge(view, &aligned).ok()?.or_given(given);
         kept.kept.then_some(kept)
     }
 
     /// The second loop: Gauss and Newton on the gaps along the measured rays.
-    fn close_along_rays(&self, view: &View, aligned: &mut Alignment) {
+    fn close_along_rays(&self, view: &View, aligned: &mut Alignment, most_steps: usize) {
         aligned.still = false;
-        for _ in 0..self.max_steps {
+        for _ in 0..most_steps {
             let gaps: Vec<Gap> =
                 view.ray_gaps(&aligned.pose, RAY_REACH_M).iter().flatten().map(|g| g.gap).collect();
             let sd_m = bulk_sd_m(gaps.iter().map(|gap| gap.size_m)).max(LEAST_SD_M);
