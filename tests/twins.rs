@@ -19,11 +19,15 @@ use matdb::units::dbm_from_watts;
 use serde_json::Value;
 use support::{echoes, entries, matdb};
 use twins::base::{Base, Slopes};
-use twins::case::{Outcome, Plan};
+use twins::case::{OTHER, Outcome, Plan, Shapes, make};
 use twins::noise::Grain;
-use twins::physics::{Class, means};
+use twins::other_surface::lossy_film;
+use twins::physics::{Class, Effect, means};
+use twins::refit::rms_left_db;
 use twins::scan::World;
 use twins::scenes::Geometry;
+use twins::strength::{floor, material, points, rms_db, size_of, thermal_w};
+use twins::surface::reflectance;
 
 const CHIRPS: usize = 1500;
 
@@ -37,6 +41,7 @@ fn plan(effects: &[&'static str], class: Option<Class>, geometry: Geometry) -> P
         geometry,
         chirps: CHIRPS,
         grain: Grain::Field,
+        shapes: Shapes::Usual,
     }
 }
 
@@ -99,6 +104,109 @@ fn one_thread_and_two_give_the_same_bytes() {
         files(out.path())
     });
     assert!(one == two);
+}
+
+#[test]
+fn other_shapes_give_other_cases_with_the_same_names_and_strengths() {
+    let usual = plan(&["anisotropy"], Some(Class::Strong), Geometry::TorsoAndArm);
+    let other = Plan { shapes: Shapes::Other, ..usual.clone() };
+    let [one, two, again] = [(); 3].map(|()| tempfile::tempdir().unwrap());
+    let labels = [label(&usual, one.path()), label(&other, two.path())];
+    assert_eq!(labels[1], label(&other, again.path()));
+    assert!(files(two.path()) == files(again.path()));
+    for (label, shapes) in std::iter::zip(&labels, ["usual", "other"]) {
+        assert_eq!(label["shapes"], shapes);
+        assert_eq!(label["effects"][0]["name"], "anisotropy");
+        let rms_db = label["rms_db"].as_f64().unwrap();
+        assert!((rms_db / Class::Strong.rms_db() - 1.0).abs() < 0.03, "{shapes}: {rms_db}");
+    }
+    assert_ne!(labels[0]["case"], labels[1]["case"]);
+    assert_ne!(labels[0]["effects"][0]["parameters"], labels[1]["effects"][0]["parameters"]);
+}
+
+/// What the base law and an effect leave together of the means of another, dB rms: the effect's own change is
+/// taken off in dB, and the base law refitted.
+fn left_db(world: &World, base: &Base, [effect, other]: [(&dyn Effect, f64); 2]) -> f64 {
+    let bare = material(base, &[other]);
+    let decibels = |acting: &[(&dyn Effect, f64)]| {
+        let base = material(base, acting);
+        let means = means(world, SEED, &base, acting, 1);
+        points(world, &means, thermal_w(world, acting), 1)
+    };
+    // The material that an effect asks for belongs to the base law.
+    let without =
+        points(world, &means(world, SEED, &material(base, &[effect]), &[], 1), world.noise_w, 1);
+    let mut left = Vec::new();
+    for ((seen, with), without) in
+        decibels(&[other]).into_iter().zip(decibels(&[effect])).zip(without)
+    {
+        if let (Some(mut point), Some(with), Some(without)) = (seen, with, without) {
+            point.power_db -= with.power_db - without.power_db;
+            left.push(point);
+        }
+    }
+    rms_left_db(&left, &bare, floor(world))
+}
+
+const SEED: u64 = 11;
+
+/// A law with a lobe and a skirt that all effects can act on.
+const LAW: Base =
+    Base { slopes: Slopes::Beckmann, m: 0.2, alpha: 3.0, k: 0.15, f_lambda: 0.1, r_s: 0.04 };
+
+/// The scan of a plan with so many chirps.
+fn scene(geometry: Geometry, chirps: usize) -> Scene {
+    let out = tempfile::tempdir().unwrap();
+    let plan = Plan { chirps, ..plan(&[], None, geometry) };
+    let name = label(&plan, out.path())["case"].as_str().unwrap().to_owned();
+    Scene::load(&out.path().join("cases").join(name).join("scene.toml")).unwrap()
+}
+
+#[test]
+fn no_other_shape_is_the_usual_one_renamed() {
+    // Draws of the usual form, and sizes about the one that is strong.
+    const DRAWS: u64 = 3;
+    const SIZES: [f64; 5] = [0.4, 0.65, 1.0, 1.5, 2.5];
+    // A weak effect leaves 0.35 dB.
+    const LEAST_DB: f64 = 0.35;
+    let scenes = Geometry::ALL.map(|geometry| scene(geometry, 700));
+    for name in OTHER {
+        let found = scenes.iter().find_map(|scene| {
+            let world = World::new(scene, &scene.target.mesh);
+            let other = make(name, Shapes::Other, SEED, &world, &LAW);
+            let size = size_of(&world, SEED, &LAW, other.as_ref(), Class::Strong).ok()?;
+            let other = (other.as_ref(), size);
+            let mut least_db = rms_db(&world, SEED, &LAW, &[other], 1);
+            for seed in 0..DRAWS {
+                let usual = make(name, Shapes::Usual, seed, &world, &LAW);
+                let strong = size_of(&world, seed, &LAW, usual.as_ref(), Class::Strong)
+                    .unwrap_or(usual.sizes()[1]);
+                for factor in SIZES {
+                    let left = left_db(&world, &LAW, [(usual.as_ref(), factor * strong), other]);
+                    least_db = least_db.min(left);
+                }
+            }
+            Some(least_db)
+        });
+        println!("{name}: {found:?}");
+        assert!(found.unwrap() > LEAST_DB, "{name}: {found:?}");
+    }
+}
+
+#[test]
+fn a_film_without_loss_reflects_as_characteristic_matrices_say() {
+    for [theta_deg, index, thickness_m, substrate] in
+        [[0.0, 1.5, 4e-4, 2.2], [35.0, 1.7, 9e-4, 1.4], [80.0, 1.4, 6.3e-4, 2.6]]
+    {
+        let theta_rad = f64::to_radians(theta_deg);
+        let expected = reflectance(theta_rad, index, thickness_m, substrate);
+        let found = lossy_film(theta_rad, index.into(), thickness_m, substrate);
+        assert!((found / expected - 1.0).abs() < 1e-9, "{theta_deg}: {found} {expected}");
+        // So thick and lossy that nothing returns from below: the film's own surface.
+        let deep = lossy_film(theta_rad, num_complex::Complex::new(index, 0.01), 1.0, substrate);
+        let own = reflectance(theta_rad, 1.0, 0.0, index);
+        assert!((deep / own - 1.0).abs() < 1e-3, "{theta_deg}: {deep} {own}");
+    }
 }
 
 #[test]

@@ -34,6 +34,8 @@ pub struct Local {
     pub specular: f64,
     /// Roughness along the grain and across it.
     pub m: [f64; 2],
+    /// A second population of facets: its share of them, and its roughness along the grain and across it.
+    pub brushed: Option<(f64, [f64; 2])>,
     /// cos² of the radar's azimuth about the normal, from the grain.
     pub cos2_azimuth: f64,
     /// Power of G1: 2 for the paper's product.
@@ -73,6 +75,7 @@ impl Base {
             slopes: self.slopes,
             specular: (1.0 - self.k) * self.f_lambda,
             m: [self.m; 2],
+            brushed: None,
             cos2_azimuth: 1.0,
             shadowings: 2.0,
             diffuse: self.k * self.r_s,
@@ -116,11 +119,24 @@ impl Local {
         }
         let diffuse = self.diffuse * (self.alpha + 2.0) / (2.0 * PI) * cos_theta.powf(self.alpha);
         let volume = self.sigma0_volume / (4.0 * PI * cos_theta * cos_theta);
+        let [speckled, mirrored] = match self.brushed {
+            None => self.lobe_parts_per_sr(cos_theta),
+            Some((share, m)) => {
+                let own = self.lobe_parts_per_sr(cos_theta).map(|f| (1.0 - share) * f);
+                let brushed = Local { m, ..*self }.lobe_parts_per_sr(cos_theta);
+                [own[0] + share * brushed[0], own[1] + share * brushed[1]]
+            }
+        };
+        [self.gain * (diffuse + volume) + speckled, mirrored]
+    }
+
+    /// The lobe of one population of facets, in the two parts.
+    fn lobe_parts_per_sr(&self, cos_theta: f64) -> [f64; 2] {
         let delta2 = self.beam_slope * self.beam_slope;
         let [along2, across2] = self.m.map(|m| m * m + delta2);
         let mirrored = delta2 / (along2 * across2).sqrt();
         let lobe = self.lobe_per_sr(cos_theta);
-        [self.gain * (diffuse + volume) + (1.0 - mirrored) * lobe, mirrored * lobe]
+        [(1.0 - mirrored) * lobe, mirrored * lobe]
     }
 
     fn lobe_per_sr(&self, cos_theta: f64) -> f64 {

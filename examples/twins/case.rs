@@ -4,6 +4,7 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
+use matdb::radar::random::Draws;
 use matdb::scene::Scene;
 use serde_json::{Value, json};
 
@@ -55,6 +56,23 @@ pub const UNKNOWN: [&str; 8] = [
     "log-normal-speckle",
 ];
 
+/// The known ones that have another form.
+pub const OTHER: [&str; 13] = [
+    "subsurface",
+    "fov-gain",
+    "angle-error",
+    "finite-spot",
+    "covering-layer",
+    "anisotropy",
+    "thin-film",
+    "multi-bounce",
+    "motion",
+    "compression",
+    "drift",
+    "correlated-shadowing",
+    "foreign-patch",
+];
+
 /// Two effects at once.
 pub const PAIRS: [[&str; 2]; 10] = [
     ["fov-gain", "foreign-patch"],
@@ -72,6 +90,16 @@ pub const PAIRS: [[&str; 2]; 10] = [
 /// An effect with its size.
 type Scaled = (Box<dyn Effect>, f64);
 
+/// Which forms the effects take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Shapes {
+    /// Those that a modeller would write down first.
+    Usual,
+    /// Those of nature and hardware, where `OTHER` has the name.
+    Other,
+}
+
 /// What a case is to be.
 #[derive(Clone, Debug)]
 pub struct Plan {
@@ -86,6 +114,7 @@ pub struct Plan {
     pub chirps: usize,
     /// Where speckle comes from: two plans that differ in nothing else have the same name and truth.
     pub grain: Grain,
+    pub shapes: Shapes,
 }
 
 /// What became of a plan.
@@ -99,8 +128,12 @@ pub enum Outcome {
 impl Plan {
     /// Draws and names follow from what the plan is, so that cases do not depend on each other.
     fn key(&self) -> (u64, String) {
+        let shapes = match self.shapes {
+            Shapes::Usual => "",
+            Shapes::Other => "/other",
+        };
         let what = format!(
-            "{}/{:?}/{:?}/{}/{}",
+            "{}/{:?}/{:?}/{}/{}{shapes}",
             self.seed, self.effects, self.class, self.number, self.attempt
         );
         let hash = blake3::hash(what.as_bytes());
@@ -145,13 +178,13 @@ impl Plan {
     /// The effects with their sizes.
     fn effects(&self, seed: u64, world: &World, base: &Base) -> Result<Vec<Scaled>, Value> {
         let sized = |&name: &&'static str| {
-            let effect = make(name, seed, world, base);
+            let effect = make(name, self.shapes, seed, world, base);
             let class = self.class.unwrap_or(Class::Moderate);
             let size =
                 size_of(world, seed, base, effect.as_ref(), class).map_err(|reached_db| {
                     json!({
                         "seed": self.seed, "effect": name, "class": class,
-                        "geometry": self.geometry, "reached_rms_db": reached_db,
+                        "geometry": self.geometry, "shapes": self.shapes, "reached_rms_db": reached_db,
                     })
                 })?;
             Ok((effect, size))
@@ -196,6 +229,7 @@ impl Plan {
             "rms_db": rms_db(world, seed, base, &acting, 1),
             "base": truth,
             "speckle": self.grain,
+            "shapes": self.shapes,
             "chirps": world.sights.len(),
             "on_target": world.sights.iter().filter(|sight| sight.look.is_some()).count(),
             "detections": detections.len(),
@@ -214,9 +248,12 @@ impl Plan {
 }
 
 /// An effect with its own random constants.
-fn make(name: &str, seed: u64, world: &World, base: &Base) -> Box<dyn Effect> {
+pub fn make(name: &str, shapes: Shapes, seed: u64, world: &World, base: &Base) -> Box<dyn Effect> {
     let number = KNOWN.iter().chain(&UNKNOWN).position(|known| *known == name).unwrap_or(0);
     let random = &mut draws(seed, number, Stream::Effect);
+    if shapes == Shapes::Other && OTHER.contains(&name) {
+        return make_other(name, seed, random, world, base);
+    }
     match name {
         "subsurface" => Box::new(Subsurface),
         "speckle" => Box::new(Speckle),
@@ -243,5 +280,32 @@ fn make(name: &str, seed: u64, world: &World, base: &Base) -> Box<dyn Effect> {
         "ghost-echo" => Box::new(Ghost::new(random, seed)),
         "log-normal-speckle" => Box::new(LogNormalSpeckle),
         _ => unreachable!("every planned effect has a maker"),
+    }
+}
+
+/// The same in another form.
+fn make_other(
+    name: &str,
+    seed: u64,
+    random: &mut Draws,
+    world: &World,
+    base: &Base,
+) -> Box<dyn Effect> {
+    use super::{other_instrument as instrument, other_surface as surface, other_target as target};
+    match name {
+        "subsurface" => Box::new(surface::Subsurface::new(random)),
+        "fov-gain" => Box::new(instrument::FovGain::new(random)),
+        "angle-error" => Box::new(target::AngleError::new(random)),
+        "finite-spot" => Box::new(target::FiniteSpot::new(random)),
+        "covering-layer" => Box::new(surface::CoveringLayer::new(random, world)),
+        "anisotropy" => Box::new(surface::Anisotropy::new(random)),
+        "thin-film" => Box::new(surface::ThinFilm::new(random, base)),
+        "multi-bounce" => Box::new(target::MultiBounce::new(world, seed, base)),
+        "motion" => Box::new(target::Motion::new(random, world)),
+        "compression" => Box::new(instrument::Compression::new(random)),
+        "drift" => Box::new(instrument::Drift::new(random)),
+        "correlated-shadowing" => Box::new(surface::CorrelatedShadowing::new(random)),
+        "foreign-patch" => Box::new(surface::ForeignPatch::new(random, world)),
+        _ => unreachable!("`OTHER` lists the names"),
     }
 }

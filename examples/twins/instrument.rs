@@ -6,12 +6,8 @@ use matdb::radar::random::Draws;
 use matdb::radar::speckle::standard_deviation_db;
 use serde_json::{Value, json};
 
-use super::physics::{Class, Effect, Fluctuation, Report};
+use super::physics::{Class, Effect, Fluctuation, Report, ratio};
 use super::scan::{Sight, World};
-
-fn ratio(db: f64) -> f64 {
-    10f64.powf(0.1 * db)
-}
 
 /// Fewer looks than declared.
 pub struct Speckle;

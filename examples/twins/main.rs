@@ -1,6 +1,7 @@
 //! Sealed twins: scans with an effect that the scene does not declare, to try a diagnosis on.
 //!
 //!     cargo run --release --example twins -- --out DIR --seeds 1..5 [--only NAME] [--chirps N] [--independent]
+//!         [--shapes usual|other]
 //!
 //! `DIR/cases/NAME/` is what a user would have: `scene.toml` with its meshes and rays, `material/` to
 //! `matdb add --from`, and `cloud.csv`. `DIR/labels/NAME.json` is the truth, in a tree of its own; the
@@ -58,6 +59,26 @@
 //! | `correlated-shadowing` | G1 instead of G1² | m of the base law |
 //! | `foreign-patch` | a ball's cut through the surface with brighter lobes of another width | dB |
 //!
+//! With `--shapes other` the same names take other forms, which nature or hardware may give them. They have
+//! the same strengths and other keys, so that the cases differ; `pose`, `speckle`, `noise-floor` and what is in
+//! no library stay as they are.
+//!
+//! | effect | with `--shapes other` | size |
+//! |---|---|---|
+//! | `subsurface` | σ_v·cos θ′·T(θ)²/T(0)²: single scattering below a border that refracts twice, at the angle θ′ inside, of index 1.4 to 2.2 | σ_v at θ = 0 |
+//! | `fov-gain` | a quartic loss about a centre beside the field's, along two unequal and turned axes; a tilt; the soft shadow of a frame on one side | dB |
+//! | `angle-error` | a waviness of 4 to 12 cm that the mesh does not have, 24 plane waves | sd of the tilt |
+//! | `finite-spot` | an evenly lit ellipse with a sharp border, 1.5 to 2.5 times as long as wide; its speckle is that of a round spot | diameter of the disc of the same area |
+//! | `covering-layer` | an outline with 2, 3 and 5 waves around, a thickness with a spread of 30 %, and a refracted way, loss/√(1 − sin²θ/n²) | two-way loss |
+//! | `anisotropy` | a share of 0.4 to 0.7 of the facets with slopes m/√q along a grain and m√q across; the others keep m | q |
+//! | `thin-film` | a lossy film of 0.4 to 1.2 mm whose thickness varies over the target by 0.04 to 0.1 mm (sd), by Airy's sum | coated share |
+//! | `multi-bounce` | paths by a second and by a third surface, both scattering evenly as the diffuse part does head on | gain per further surface |
+//! | `motion` | a sway with a pause, one shift of weight, breathing, and turns about two axes | amplitude of the sway |
+//! | `compression` | a gain control: dB count 3 to 6 times less above a threshold, with a parabolic knee of 4 to 10 dB and no ceiling | 1/threshold |
+//! | `drift` | warming up, exp(−t/τ), a jump, and a smoothed random walk, in dB | dB |
+//! | `correlated-shadowing` | G1 to the power 1 + exp(−θ/θ₀), θ₀ of 15° to 35° | m of the base law |
+//! | `foreign-patch` | three or four blots that run into each other; the diffuse part is brighter by another factor | dB of the specular part |
+//!
 //! Not in any library: `mirror-ripple` (gain periodic in the mirror's turn), `standing-wave` (gain
 //! periodic in range), `image-azimuth` (cos 2ψ in the image plane), `rope-shadow` (a stripe of loss),
 //! `coarse-steps` (powers in steps of dB), `dropouts` (bursts of lost chirps), `ghost-echo` (a share of
@@ -81,6 +102,9 @@ pub mod case;
 pub mod field;
 pub mod instrument;
 pub mod noise;
+pub mod other_instrument;
+pub mod other_surface;
+pub mod other_target;
 pub mod physics;
 pub mod refit;
 pub mod scan;
@@ -90,6 +114,7 @@ pub mod strength;
 pub mod surface;
 pub mod target;
 pub mod unknowns;
+pub mod waves;
 pub mod write;
 
 use std::error::Error;
@@ -98,7 +123,7 @@ use std::time::Instant;
 
 use clap::Parser;
 
-use case::{KNOWN, Outcome, PAIRS, Plan, UNKNOWN};
+use case::{KNOWN, Outcome, PAIRS, Plan, Shapes, UNKNOWN};
 use noise::Grain;
 use physics::Class;
 use scenes::Geometry;
@@ -121,6 +146,9 @@ struct Args {
     /// Draw speckle anew for every chirp instead of from scatterers on the surface
     #[arg(long)]
     independent: bool,
+    /// Forms of the effects: those of the first table of this example's page, or of the second
+    #[arg(long, value_enum, default_value_t = Shapes::Usual)]
+    shapes: Shapes,
 }
 
 fn seeds(text: &str) -> Result<std::ops::Range<u64>, String> {
@@ -134,14 +162,15 @@ const COMPLETE: usize = 5;
 
 /// All cases of a seed: every effect in every class, the pairs, and nothing missing. Geometries take
 /// turns from seed to seed.
-pub fn plans(seed: u64, chirps: usize, grain: Grain) -> Vec<Plan> {
+pub fn plans(seed: u64, chirps: usize, grain: Grain, shapes: Shapes) -> Vec<Plan> {
     let mut plans = Vec::new();
     let mut add = |effects: &[&'static str], class: Option<Class>| {
         let number = plans.len();
         let turn = (seed as usize).wrapping_add(number + number / 4) % Geometry::ALL.len();
         let geometry = Geometry::ALL[turn];
         let effects = effects.to_vec();
-        plans.push(Plan { seed, number, attempt: 0, effects, class, geometry, chirps, grain });
+        let attempt = 0;
+        plans.push(Plan { seed, number, attempt, effects, class, geometry, chirps, grain, shapes });
     };
     for name in KNOWN.iter().chain(&UNKNOWN) {
         Class::ALL.iter().for_each(|&class| add(&[name], Some(class)));
@@ -203,7 +232,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let grain = if args.independent { Grain::Independent } else { Grain::Field };
     for seed in args.seeds.clone() {
         let mut missed = Vec::new();
-        let mut plans = plans(seed, args.chirps as usize, grain);
+        let mut plans = plans(seed, args.chirps as usize, grain, args.shapes);
         plans.retain(|plan| wanted(plan, args.only.as_deref()));
         if plans.is_empty() {
             return Err("no case has such a name; give an effect, `pairs` or `nothing`".into());

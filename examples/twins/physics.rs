@@ -1,6 +1,6 @@
 //! From the base law to the mean power of every chirp, with whatever effects act on the way.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{LN_2, TAU};
 
 use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
@@ -29,6 +29,11 @@ impl Class {
             Class::Strong => 2.2,
         }
     }
+}
+
+/// A ratio of powers from decibels.
+pub fn ratio(db: f64) -> f64 {
+    10f64.powf(0.1 * db)
 }
 
 /// Law of the fluctuation about the mean.
@@ -101,8 +106,17 @@ pub trait Effect: Sync {
     fn spot_diameter_m(&self, _size: f64) -> Option<f64> {
         None
     }
-    /// Tilt of the true normal in two directions along the surface, as tangents.
-    fn tilt(&self, _size: f64, _chirp: usize) -> DVec2 {
+    /// Where a ray of the spot lies, in m across the beam, that has this share of the power inside its radius
+    /// and stands at this share of a turn. What is sent and received alike, exp(−8 ln 2·r²/D²), is a Gaussian
+    /// of one standard deviation in each direction.
+    fn spot_place_m(&self, diameter_m: f64, [inside, turn]: [f64; 2]) -> DVec2 {
+        let sd_m = diameter_m / (16.0 * LN_2).sqrt();
+        let radius_m = sd_m * (-2.0 * (1.0 - inside).ln()).sqrt();
+        radius_m * DVec2::from_angle(TAU * turn)
+    }
+    /// Tilt of the true normal, as tangents along the two directions that
+    /// `DVec3::any_orthonormal_pair` gives for the declared normal.
+    fn tilt(&self, _size: f64, _chirp: usize, _look: &Shot) -> DVec2 {
         DVec2::ZERO
     }
     fn surface(&self, _size: f64, _look: &Shot, _law: &mut Local) {}
@@ -185,7 +199,8 @@ struct Part {
 
 /// Equation (11) at one place.
 fn part(world: &World, base: &Base, acting: &[Acting], sight: &Sight, look: &Shot) -> Part {
-    let tilt: DVec2 = acting.iter().map(|(effect, size)| effect.tilt(*size, sight.chirp)).sum();
+    let tilt: DVec2 =
+        acting.iter().map(|(effect, size)| effect.tilt(*size, sight.chirp, look)).sum();
     let mut look = *look;
     if tilt != DVec2::ZERO {
         let (u, v) = look.normal.any_orthonormal_pair();
@@ -247,7 +262,12 @@ pub fn moves(acting: &[Acting], sight: &Sight) -> Vec<Displacement> {
 
 /// Diameter at half the intensity over which a chirp averages, m.
 pub fn spot_diameter_m(acting: &[Acting]) -> Option<f64> {
-    acting.iter().find_map(|(effect, size)| effect.spot_diameter_m(*size))
+    spot(acting).map(|(_, diameter_m)| diameter_m)
+}
+
+/// The effect that widens the spot, and the diameter.
+fn spot<'a>(acting: &[Acting<'a>]) -> Option<Acting<'a>> {
+    acting.iter().find_map(|(effect, size)| Some((*effect, effect.spot_diameter_m(*size)?)))
 }
 
 /// Origin and direction of a chirp's ray in the frame of the target, which stands still there.
@@ -260,27 +280,24 @@ pub fn into_target(acting: &[Acting], sight: &Sight) -> [DVec3; 2] {
 
 /// What the rays of one chirp meet on the target as it really stands.
 fn looks(world: &World, seed: u64, acting: &[Acting], sight: &Sight) -> Vec<Option<Shot>> {
-    let diameter_m = spot_diameter_m(acting);
+    let spot = spot(acting);
     let moved = moves(acting, sight);
-    if moved.is_empty() && diameter_m.is_none() {
+    if moved.is_empty() && spot.is_none() {
         return vec![sight.look];
     }
     let [origin, forward] = into_target(acting, sight);
-    let Some(diameter_m) = diameter_m else {
+    let Some((spot, diameter_m)) = spot else {
         return vec![ray(origin, forward).and_then(|ray| look(&world.bvh, &ray))];
     };
     let range_m = sight.look.map_or(8.0, |look| look.range_m);
-    // What is sent and received alike, exp(−8 ln 2·r²/D²), is a Gaussian of this standard deviation in each
-    // direction.
-    let sd_m = diameter_m / (16.0 * std::f64::consts::LN_2).sqrt();
     let turn_per_m = world.waist.towards(sight.place_m).turn_per_m(range_m);
     let (u, v) = forward.any_orthonormal_pair();
     let mut random = draws(seed, sight.chirp, Stream::Spot);
     let mut within = |cell: usize| (cell as f64 + random.uniform()) / SPOT_CELLS as f64;
     let aside = |cell: usize| {
-        let radius_m = sd_m * (-2.0 * (1.0 - within(cell / SPOT_CELLS)).ln()).sqrt();
-        let (across, along) = (TAU * within(cell % SPOT_CELLS)).sin_cos();
-        radius_m * (along * u + across * v)
+        let shares = [within(cell / SPOT_CELLS), within(cell % SPOT_CELLS)];
+        let place_m = spot.spot_place_m(diameter_m, shares);
+        place_m.x * u + place_m.y * v
     };
     // The wave runs at right angles to its front, on which all rays have come equally far.
     let bent = |aside_m: DVec3| {

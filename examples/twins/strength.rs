@@ -38,9 +38,26 @@ pub fn material(base: &Base, acting: &[Acting]) -> Base {
 pub fn rms_db(world: &World, seed: u64, base: &Base, acting: &[Acting], stride: usize) -> f64 {
     let base = material(base, acting);
     let means = means(world, seed, &base, acting, stride);
-    let noise_w = thermal_w(world, acting);
-    let points: Vec<Point> = std::iter::zip(world.sights.iter().step_by(stride), &means)
-        .filter_map(|(sight, mean)| {
+    let points: Vec<Point> =
+        points(world, &means, thermal_w(world, acting), stride).into_iter().flatten().collect();
+    if points.len() < FEWEST { 0.0 } else { rms_left_db(&points, &base, floor(world)) }
+}
+
+/// What the instrument is declared to be.
+pub fn floor(world: &World) -> Floor {
+    Floor { noise_w: world.noise_w, threshold_w: world.threshold_w }
+}
+
+/// The means of every `stride`-th chirp with thermal noise, at the declared geometry; `None` for what lies below
+/// the threshold.
+pub fn points(
+    world: &World,
+    means: &[Option<Echo>],
+    noise_w: f64,
+    stride: usize,
+) -> Vec<Option<Point>> {
+    std::iter::zip(world.sights.iter().step_by(stride), means)
+        .map(|(sight, mean)| {
             let (look, Echo { report, .. }) = (sight.look?, (*mean)?);
             let (power_w, cos_theta) = (report.power_w + noise_w, look.cos_theta());
             let received_sr = world.waist.received_sr(sight.place_m, look.range_m);
@@ -50,9 +67,7 @@ pub fn rms_db(world: &World, seed: u64, base: &Base, acting: &[Acting], stride: 
             let point = Point { cos_theta, watts_per_f, power_db, beam_slope };
             (power_w >= world.threshold_w).then_some(point)
         })
-        .collect();
-    let floor = Floor { noise_w: world.noise_w, threshold_w: world.threshold_w };
-    if points.len() < FEWEST { 0.0 } else { rms_left_db(&points, &base, floor) }
+        .collect()
 }
 
 /// The size at which an effect is of a class.

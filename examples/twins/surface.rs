@@ -6,12 +6,8 @@ use num_complex::Complex;
 use serde_json::{Value, json};
 
 use super::base::{Base, Local};
-use super::physics::Effect;
+use super::physics::{Effect, ratio};
 use super::scan::{Shot, World};
-
-fn ratio(db: f64) -> f64 {
-    10f64.powf(0.1 * db)
-}
 
 /// A volume below: a σ⁰ that does not depend on θ.
 pub struct Subsurface;
@@ -154,7 +150,7 @@ impl Effect for ThinFilm {
 
 /// Reflectance of a film on a half space by characteristic matrices (Born & Wolf, Principles of
 /// Optics, sec. 1.6) at 300 GHz, the mean of both polarisations.
-fn reflectance(theta_rad: f64, index: f64, thickness_m: f64, substrate: f64) -> f64 {
+pub fn reflectance(theta_rad: f64, index: f64, thickness_m: f64, substrate: f64) -> f64 {
     let wave_per_m = std::f64::consts::TAU * 300e9 / 299_792_458.0;
     let cos = |n: f64| (1.0 - (theta_rad.sin() / n).powi(2)).sqrt();
     let phase = wave_per_m * index * thickness_m * cos(index);

@@ -129,7 +129,7 @@ impl Effect for AngleError {
     fn parameters(&self, size: f64) -> Value {
         json!({ "sd_deg": size.atan().to_degrees(), "meaning": "in each of two directions" })
     }
-    fn tilt(&self, size: f64, chirp: usize) -> DVec2 {
+    fn tilt(&self, size: f64, chirp: usize, _: &Shot) -> DVec2 {
         let mut random = draws(self.seed, chirp, Stream::Tilt);
         size * DVec2::new(random.gaussian(), random.gaussian())
     }
@@ -141,7 +141,7 @@ pub struct MultiBounce {
 }
 
 /// Directions that are followed from each lit point.
-const ONWARD: usize = 512;
+pub const ONWARD: usize = 512;
 
 impl MultiBounce {
     pub fn new(world: &World, seed: u64, base: &Base) -> MultiBounce {
@@ -179,10 +179,7 @@ fn second_segment(world: &World, base: &Base, sight: &Sight, random: &mut Draws)
         if cos <= 0.0 {
             continue;
         }
-        // Two ways of drawing, each as often: the weight divides by their mean density.
-        let lobe = base.slopes.d_per_sr(a.normal.dot(facet), base.m) * a.normal.dot(facet)
-            / (4.0 * a.to_radar.dot(facet).max(1e-6));
-        let density = 0.5 * (cos / PI + lobe);
+        let density = onward_per_sr(base, a, [to, facet]);
         let Some((b, range_m)) = returned(world, a, to) else { continue };
         // The antenna's width counts once per path, where it leaves the second surface.
         let f = base.bistatic_per_sr([a.normal, a.to_radar, to], 0.0);
@@ -201,8 +198,8 @@ fn second_segment(world: &World, base: &Base, sight: &Sight, random: &mut Draws)
 /// Level of the antenna's side lobes, which see what lies outside the spot.
 const SIDE_LOBES: f64 = 0.01;
 
-/// λ²/(π·w²) for what reaches the antenna from a second surface, sr.
-fn received_sr(world: &World, sight: &Sight, a: &Shot, b: &Shot) -> f64 {
+/// λ²/(π·w²) for what reaches the antenna from another surface than the first, A, sr.
+pub fn received_sr(world: &World, sight: &Sight, a: &Shot, b: &Shot) -> f64 {
     let across_m2 = (b.point - a.point).reject_from(sight.ray.direction.xyz()).length_squared();
     let spot_m2 = world.waist.towards(sight.place_m).radius_m2(b.range_m);
     overlap(across_m2, spot_m2) * world.waist.received_sr(sight.place_m, b.range_m)
@@ -214,7 +211,7 @@ pub fn overlap(aside_m2: f64, spot_m2: f64) -> f64 {
 }
 
 /// A direction away from A and the facet normal that would mirror the radar's ray into it.
-fn onward(base: &Base, a: &Shot, diffuse: bool, random: &mut Draws) -> [DVec3; 2] {
+pub fn onward(base: &Base, a: &Shot, diffuse: bool, random: &mut Draws) -> [DVec3; 2] {
     let (u, v) = a.normal.any_orthonormal_pair();
     let (sin, cos) = (TAU * random.uniform()).sin_cos();
     let uniform = random.uniform();
@@ -228,10 +225,31 @@ fn onward(base: &Base, a: &Shot, diffuse: bool, random: &mut Draws) -> [DVec3; 2
     [2.0 * a.to_radar.dot(facet) * facet - a.to_radar, facet]
 }
 
+/// How densely `onward` draws a direction, 1/sr: two ways of drawing, each as often.
+pub fn onward_per_sr(base: &Base, a: &Shot, [to, facet]: [DVec3; 2]) -> f64 {
+    let lobe = base.slopes.d_per_sr(a.normal.dot(facet), base.m) * a.normal.dot(facet)
+        / (4.0 * a.to_radar.dot(facet).max(1e-6));
+    0.5 * (a.normal.dot(to) / PI + lobe)
+}
+
+/// So far above a surface a ray starts that leaves it.
+const OFF_SURFACE_M: f64 = 1e-4;
+
+/// The next surface that a ray from a point of one meets.
+pub fn next(world: &World, from: &Shot, to: DVec3) -> Option<Shot> {
+    look(&world.bvh, &ray(from.point + OFF_SURFACE_M * from.normal, to)?)
+}
+
 /// The second surface as the antenna sees it, and half the length of the whole way, m.
 fn returned(world: &World, a: &Shot, to: DVec3) -> Option<(Shot, f64)> {
-    const OFF_SURFACE_M: f64 = 1e-4;
-    let b = look(&world.bvh, &ray(a.point + OFF_SURFACE_M * a.normal, to)?)?;
+    let b = next(world, a, to)?;
+    let seen = seen_from_antenna(world, &b)?;
+    let half_m = 0.5 * (a.range_m + b.range_m + seen.range_m);
+    Some((seen, half_m))
+}
+
+/// A surface as the antenna sees it, if it does, that another one lights.
+pub fn seen_from_antenna(world: &World, b: &Shot) -> Option<Shot> {
     let back = world.origin - b.point;
     let (range_m, to_radar) = (back.length(), back.normalize());
     // The side that the first surface lights has to be the one that the antenna sees.
@@ -240,6 +258,5 @@ fn returned(world: &World, a: &Shot, to: DVec3) -> Option<(Shot, f64)> {
     }
     let seen = look(&world.bvh, &ray(world.origin, -to_radar)?)?;
     let hidden = seen.range_m < range_m - 10.0 * OFF_SURFACE_M;
-    let half_m = 0.5 * (a.range_m + b.range_m + range_m);
-    (!hidden).then_some((Shot { to_radar, range_m, ..b }, half_m))
+    (!hidden).then_some(Shot { to_radar, range_m, ..*b })
 }
