@@ -133,7 +133,7 @@ def other_runs(results):
             runs.setdefault((run["date"], run["commit"], run["load_before"], run["cpu"]), []).append((part, run["minutes"]))
     for (date, commit, load, cpu), parts in runs.items():
         minutes = sum(of for _, of in parts)
-        when = f"on {date} at `{commit}`, {minutes:.0f} minutes, load before them {load}"
+        when = f"on {date} at `{commit}`, {minutes:.0f} minutes, load before them {'unknown' if load is None else load}"
         yield ", ".join(part for part, _ in parts), when + f", by {cpu}" * (cpu != machine["cpu"])
 
 
