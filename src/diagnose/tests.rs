@@ -659,6 +659,39 @@ fn a_false_alarm_at_the_target_says_what_its_kind_of_return_says() {
     assert!(terms[2].ln_p.abs() < 1e-3 && terms[2].slope.abs() < 1e-9, "{:?}", terms[2]);
 }
 
+/// Noise that most chirps report which miss the target is no other target; the target's own chirps then report as often.
+#[test]
+fn false_alarms_of_chirps_that_miss_may_be_the_most_of_a_cloud() {
+    use crate::measure::cloud::{Cloud, CloudPoint};
+    let mut mesh = solids::plate(0.5, 0.5);
+    mesh.vertices.iter_mut().for_each(|v| *v += DVec3::new(0.0, 1.1, 0.0));
+    let bench = Bench::new(mesh);
+    let (stage, chirps) = (bench.stage(), &bench.chirps);
+    let shots = trace_shots(&stage).unwrap();
+    let echo = |shot: &Shot| CloudPoint {
+        chirp: Some(shot.chirp),
+        point: shot.hit.point,
+        range_m: None,
+        power_w: 1e-9,
+    };
+    let noise = chirps.number.iter().zip(&chirps.rays).filter_map(|(chirp, ray)| {
+        let misses = shots.iter().all(|shot| shot.chirp != *chirp);
+        let point = Point::from(ray.origin.xyz + 7.3 * ray.direction.xyz());
+        let (chirp, power_w) = (Some(*chirp), 1.5 * THRESHOLD_W);
+        misses.then_some(CloudPoint { chirp, point, range_m: None, power_w })
+    });
+    let noise: Vec<CloudPoint> = noise.collect();
+    let matched = |echoes: usize| {
+        let echoes = shots.iter().take(echoes).map(echo);
+        let cloud = Cloud::new(noise.iter().copied().chain(echoes).collect()).unwrap();
+        match_cloud(&cloud, chirps, &shots, THRESHOLD_W, Returns::Strongest, None)
+    };
+    let found = matched(shots.len()).unwrap();
+    assert!(noise.len() > shots.len() && found.alarms.of_misses.len() == noise.len());
+    // Where others report and those towards the target do not, it is not there.
+    assert!(matches!(matched(shots.len() / 4), Err(DiagnoseError::Elsewhere { .. })));
+}
+
 #[test]
 fn a_wide_spot_sees_past_the_edge() {
     use crate::measure::cloud::{Cloud, CloudPoint};
