@@ -23,10 +23,10 @@ use twins::case::{OTHER, Outcome, Plan, Shapes, make};
 use twins::noise::Grain;
 use twins::other_surface::lossy_film;
 use twins::physics::{Class, Effect, means};
-use twins::refit::rms_left_db;
-use twins::scan::World;
+use twins::refit::{Point, rms_left_db};
+use twins::scan::{Stream, World, draws};
 use twins::scenes::Geometry;
-use twins::strength::{floor, material, points, rms_db, size_of, thermal_w};
+use twins::strength::{floor, material, points, size_of, thermal_w};
 use twins::surface::reflectance;
 
 const CHIRPS: usize = 1500;
@@ -108,7 +108,7 @@ fn one_thread_and_two_give_the_same_bytes() {
 
 #[test]
 fn other_shapes_give_other_cases_with_the_same_names_and_strengths() {
-    let usual = plan(&["anisotropy"], Some(Class::Strong), Geometry::TorsoAndArm);
+    let usual = plan(&["covering-layer"], Some(Class::Strong), Geometry::WavyPanel);
     let other = Plan { shapes: Shapes::Other, ..usual.clone() };
     let [one, two, again] = [(); 3].map(|()| tempfile::tempdir().unwrap());
     let labels = [label(&usual, one.path()), label(&other, two.path())];
@@ -116,7 +116,7 @@ fn other_shapes_give_other_cases_with_the_same_names_and_strengths() {
     assert!(files(two.path()) == files(again.path()));
     for (label, shapes) in std::iter::zip(&labels, ["usual", "other"]) {
         assert_eq!(label["shapes"], shapes);
-        assert_eq!(label["effects"][0]["name"], "anisotropy");
+        assert_eq!(label["effects"][0]["name"], "covering-layer");
         let rms_db = label["rms_db"].as_f64().unwrap();
         assert!((rms_db / Class::Strong.rms_db() - 1.0).abs() < 0.03, "{shapes}: {rms_db}");
     }
@@ -124,73 +124,112 @@ fn other_shapes_give_other_cases_with_the_same_names_and_strengths() {
     assert_ne!(labels[0]["effects"][0]["parameters"], labels[1]["effects"][0]["parameters"]);
 }
 
-/// What the base law and an effect leave together of the means of another, dB rms: the effect's own change is
-/// taken off in dB, and the base law refitted.
-fn left_db(world: &World, base: &Base, [effect, other]: [(&dyn Effect, f64); 2]) -> f64 {
-    let bare = material(base, &[other]);
-    let decibels = |acting: &[(&dyn Effect, f64)]| {
-        let base = material(base, acting);
-        let means = means(world, SEED, &base, acting, 1);
-        points(world, &means, thermal_w(world, acting), 1)
-    };
-    // The material that an effect asks for belongs to the base law.
-    let without =
-        points(world, &means(world, SEED, &material(base, &[effect]), &[], 1), world.noise_w, 1);
-    let mut left = Vec::new();
-    for ((seen, with), without) in
-        decibels(&[other]).into_iter().zip(decibels(&[effect])).zip(without)
-    {
-        if let (Some(mut point), Some(with), Some(without)) = (seen, with, without) {
-            point.power_db -= with.power_db - without.power_db;
-            left.push(point);
-        }
-    }
-    rms_left_db(&left, &bare, floor(world))
-}
-
 const SEED: u64 = 11;
 
-/// A law with a lobe and a skirt that all effects can act on.
-const LAW: Base =
-    Base { slopes: Slopes::Beckmann, m: 0.2, alpha: 3.0, k: 0.15, f_lambda: 0.1, r_s: 0.04 };
+/// An effect with its size.
+type Sized<'a> = (&'a dyn Effect, f64);
 
-/// The scan of a plan with so many chirps.
-fn scene(geometry: Geometry, chirps: usize) -> Scene {
+/// What a chirp of a scan with an effect has above the threshold, in noise.
+fn seen(world: &World, base: &Base, acting: &[Sized]) -> Vec<Option<Point>> {
+    points(world, &means(world, SEED, base, acting, 1), thermal_w(world, acting), 1)
+}
+
+/// What a usual form leaves of the means of another, dB rms, when its own change is taken off in dB and the
+/// base law refitted.
+fn left_db(world: &World, law: &Base, usual: Sized, other: Sized) -> f64 {
+    // The material that an effect asks for belongs to the base law.
+    let [base, of_usual] = [other, usual].map(|effect| material(law, &[effect]));
+    let with = seen(world, &of_usual, &[usual]);
+    let without = seen(world, &of_usual, &[]);
+    let mut left = Vec::new();
+    for (chirp, point) in seen(world, &base, &[other]).into_iter().enumerate() {
+        if let (Some(point), Some(with), Some(without)) = (point, with[chirp], without[chirp]) {
+            let power_db = point.power_db - with.power_db + without.power_db;
+            left.push(Point { power_db, ..point });
+        }
+    }
+    rms_left_db(&left, &base, floor(world))
+}
+
+/// The least that the usual form leaves of the other one, over draws of its constants and over sizes, dB rms.
+/// `None` where the other form is not as strong as the class.
+fn least_left_db(world: &World, law: &Base, name: &str, class: Class) -> Option<f64> {
+    const DRAWS: u64 = 8;
+    const SIZES: [f64; 7] = [0.2, 0.4, 0.6, 0.8, 1.0, 1.5, 2.5];
+    let other = make(name, Shapes::Other, SEED, world, law);
+    let other = (other.as_ref(), size_of(world, SEED, law, other.as_ref(), class).ok()?);
+    let mut least_db = f64::INFINITY;
+    let mut drawn = Vec::new();
+    for seed in 0..DRAWS {
+        let usual = make(name, Shapes::Usual, seed, world, law);
+        // A form without constants is drawn once.
+        if drawn.contains(&usual.parameters(1.0)) {
+            break;
+        }
+        drawn.push(usual.parameters(1.0));
+        let size = size_of(world, seed, law, usual.as_ref(), class).unwrap_or(usual.sizes()[1]);
+        for factor in SIZES {
+            let left = left_db(world, law, (usual.as_ref(), factor * size), other);
+            least_db = least_db.min(left);
+        }
+    }
+    Some(least_db)
+}
+
+/// The scan of a geometry, with few chirps.
+fn scene(geometry: Geometry) -> Scene {
     let out = tempfile::tempdir().unwrap();
-    let plan = Plan { chirps, ..plan(&[], None, geometry) };
+    let plan = Plan { chirps: 700, ..plan(&[], None, geometry) };
     let name = label(&plan, out.path())["case"].as_str().unwrap().to_owned();
     Scene::load(&out.path().join("cases").join(name).join("scene.toml")).unwrap()
 }
 
 #[test]
 fn no_other_shape_is_the_usual_one_renamed() {
-    // Draws of the usual form, and sizes about the one that is strong.
-    const DRAWS: u64 = 3;
-    const SIZES: [f64; 5] = [0.4, 0.65, 1.0, 1.5, 2.5];
-    // A weak effect leaves 0.35 dB.
-    const LEAST_DB: f64 = 0.35;
-    let scenes = Geometry::ALL.map(|geometry| scene(geometry, 700));
+    // Share of the strength that must remain: two forms of one effect have most in common where it depends on
+    // the incidence angle alone.
+    const LEAST_SHARE: f64 = 0.1;
+    let scenes = Geometry::ALL.map(scene);
+    let worlds = scenes.each_ref().map(|scene| World::new(scene, &scene.target.mesh));
+    let laws: Vec<Base> = (0..8).map(|n| Base::draw(&mut draws(n, 0, Stream::Base))).collect();
+    let tries: Vec<(&Base, &World)> =
+        laws.iter().flat_map(|law| worlds.iter().map(move |world| (law, world))).collect();
     for name in OTHER {
-        let found = scenes.iter().find_map(|scene| {
-            let world = World::new(scene, &scene.target.mesh);
-            let other = make(name, Shapes::Other, SEED, &world, &LAW);
-            let size = size_of(&world, SEED, &LAW, other.as_ref(), Class::Strong).ok()?;
-            let other = (other.as_ref(), size);
-            let mut least_db = rms_db(&world, SEED, &LAW, &[other], 1);
-            for seed in 0..DRAWS {
-                let usual = make(name, Shapes::Usual, seed, &world, &LAW);
-                let strong = size_of(&world, seed, &LAW, usual.as_ref(), Class::Strong)
-                    .unwrap_or(usual.sizes()[1]);
-                for factor in SIZES {
-                    let left = left_db(&world, &LAW, [(usual.as_ref(), factor * strong), other]);
-                    least_db = least_db.min(left);
-                }
-            }
-            Some(least_db)
-        });
-        println!("{name}: {found:?}");
-        assert!(found.unwrap() > LEAST_DB, "{name}: {found:?}");
+        // What this one changes is so little that refitted laws take up the difference: see the next test.
+        if name == "correlated-shadowing" {
+            continue;
+        }
+        // A gain control without a ceiling does not get strong.
+        let class = if name == "compression" { Class::Moderate } else { Class::Strong };
+        let found = tries
+            .iter()
+            .find_map(|(law, world)| least_left_db(world, law, name, class))
+            .unwrap_or_else(|| panic!("{name} does not get {class:?}"));
+        assert!(found > LEAST_SHARE * class.rms_db(), "{name}: {found} dB");
     }
+}
+
+#[test]
+fn partly_correlated_shadowing_lies_between_one_g1_and_its_square() {
+    let scene = scene(Geometry::WavyPanel);
+    let world = World::new(&scene, &scene.target.mesh);
+    let base = Base { slopes: Slopes::Ggx, m: 0.8, alpha: 2.0, k: 1e-6, f_lambda: 0.1, r_s: 1e-6 };
+    let of = |shapes| make("correlated-shadowing", shapes, SEED, &world, &base);
+    let [once, partly] = [of(Shapes::Usual), of(Shapes::Other)];
+    let powers_w = |acting: &[Sized]| {
+        let means = means(&world, SEED, &base, acting, 1);
+        means.into_iter().map(|mean| mean.unwrap().report.power_w).collect::<Vec<f64>>()
+    };
+    let squared = powers_w(&[]);
+    let [once, partly] = [once, partly].map(|effect| powers_w(&[(effect.as_ref(), 0.8)]));
+    let mut apart_db = 0.0f64;
+    for ((squared_w, partly_w), once_w) in squared.into_iter().zip(partly).zip(once) {
+        assert!(squared_w <= partly_w && partly_w <= once_w, "{squared_w} {partly_w} {once_w}");
+        let [above, below] = [partly_w / squared_w, once_w / partly_w].map(|r| 10.0 * r.log10());
+        apart_db = apart_db.max(above.min(below));
+    }
+    // At 45° G1 takes 0.6 dB.
+    assert!(apart_db > 0.1, "{apart_db}");
 }
 
 #[test]

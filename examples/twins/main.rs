@@ -65,10 +65,10 @@
 //!
 //! | effect | with `--shapes other` | size |
 //! |---|---|---|
-//! | `subsurface` | σ_v·cos θ′·T(θ)²/T(0)²: single scattering below a border that refracts twice, at the angle θ′ inside, of index 1.4 to 2.2 | σ_v at θ = 0 |
+//! | `subsurface` | σ_v·cos θ′·T(θ)²/T(0)²: single scattering below a border that refracts twice, at the angle θ′ inside, of index 1.4 to 2.2; the content varies over the target by 30 % | σ_v at θ = 0 |
 //! | `fov-gain` | a quartic loss about a centre beside the field's, along two unequal and turned axes; a tilt; the soft shadow of a frame on one side | dB |
 //! | `angle-error` | a waviness of 4 to 12 cm that the mesh does not have, 24 plane waves | sd of the tilt |
-//! | `finite-spot` | an evenly lit ellipse with a sharp border, 1.5 to 2.5 times as long as wide; its speckle is that of a round spot | diameter of the disc of the same area |
+//! | `finite-spot` | an evenly lit ellipse with a sharp border, 2 to 3.5 times as long as wide; its speckle is that of a round spot | diameter of the disc of the same area |
 //! | `covering-layer` | an outline with 2, 3 and 5 waves around, a thickness with a spread of 30 %, and a refracted way, loss/√(1 − sin²θ/n²) | two-way loss |
 //! | `anisotropy` | a share of 0.4 to 0.7 of the facets with slopes m/√q along a grain and m√q across; the others keep m | q |
 //! | `thin-film` | a lossy film of 0.4 to 1.2 mm whose thickness varies over the target by 0.04 to 0.1 mm (sd), by Airy's sum | coated share |

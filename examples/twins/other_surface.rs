@@ -18,6 +18,14 @@ fn theta_rad(look: &Shot) -> f64 {
     look.cos_theta().clamp(0.0, 1.0).acos()
 }
 
+/// Standard deviation of the logarithm of what lies unevenly.
+const UNEVEN: f64 = 0.3;
+
+/// How much of something uneven is at a place, over its mean.
+fn uneven(field: &Waves, look: &Shot) -> f64 {
+    (UNEVEN * field.at(look.point) - 0.5 * UNEVEN * UNEVEN).exp()
+}
+
 /// Cosine of the angle that a ray has inside, by Snell's law.
 fn cos_inside(theta_rad: f64, index: f64) -> f64 {
     (1.0 - (theta_rad.sin() / index).powi(2)).sqrt()
@@ -25,14 +33,15 @@ fn cos_inside(theta_rad: f64, index: f64) -> f64 {
 
 /// Single scattering below a border that refracts, as in snow (Ulaby, Moore and Fung, Microwave Remote Sensing,
 /// vol. 3): σ⁰ falls with the cosine of the angle θ' inside, and the border lets through T(θ) on the way in and
-/// out (Fresnel, the mean of both polarisations).
+/// out (Fresnel, the mean of both polarisations). What scatters, such as glass fibre, lies unevenly.
 pub struct Subsurface {
     index: f64,
+    content: Waves,
 }
 
 impl Subsurface {
     pub fn new(random: &mut Draws) -> Subsurface {
-        Subsurface { index: 1.4 + 0.8 * random.uniform() }
+        Subsurface { index: 1.4 + 0.8 * random.uniform(), content: Waves::new(random, [0.08, 0.4]) }
     }
 
     fn let_through(&self, theta_rad: f64) -> f64 {
@@ -52,12 +61,14 @@ impl Effect for Subsurface {
             "form": "sigma0 = sigma0(0) cos(theta') T(theta)^2/T(0)^2, theta' inside",
             "sigma0_at_normal_db": 10.0 * size.log10(),
             "index": self.index,
+            "sd_of_ln_content": UNEVEN,
         })
     }
     fn surface(&self, size: f64, look: &Shot, law: &mut Local) {
         let theta_rad = theta_rad(look);
         let through = self.let_through(theta_rad) / self.let_through(0.0);
-        law.sigma0_volume += size * cos_inside(theta_rad, self.index) * through * through;
+        let inside = cos_inside(theta_rad, self.index) * uneven(&self.content, look);
+        law.sigma0_volume += size * inside * through * through;
     }
 }
 
@@ -74,9 +85,6 @@ pub struct CoveringLayer {
 
 /// Waves that go around the outline.
 const AROUND: [f64; 3] = [2.0, 3.0, 5.0];
-/// Standard deviation of the logarithm of the thickness.
-const UNEVEN: f64 = 0.3;
-
 impl CoveringLayer {
     /// Covers a quarter to six tenths of what is met, about a point of it.
     pub fn new(random: &mut Draws, world: &World) -> CoveringLayer {
@@ -131,9 +139,8 @@ impl Effect for CoveringLayer {
     }
     fn surface(&self, size: f64, look: &Shot, law: &mut Local) {
         if self.reached(look.point) < self.reach_m {
-            let thickness = (UNEVEN * self.thickness.at(look.point) - 0.5 * UNEVEN * UNEVEN).exp();
             let cos_inside = cos_inside(theta_rad(look), self.index);
-            law.gain *= ratio(-size * thickness / cos_inside);
+            law.gain *= ratio(-size * uneven(&self.thickness, look) / cos_inside);
         }
     }
 }

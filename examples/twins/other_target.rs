@@ -108,7 +108,7 @@ pub struct FiniteSpot {
 
 impl FiniteSpot {
     pub fn new(random: &mut Draws) -> FiniteSpot {
-        FiniteSpot { elongation: 1.5 + random.uniform(), turn_rad: PI * random.uniform() }
+        FiniteSpot { elongation: 2.0 + 1.5 * random.uniform(), turn_rad: PI * random.uniform() }
     }
 }
 
