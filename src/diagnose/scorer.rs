@@ -122,11 +122,11 @@ impl Scorer<'_> {
         // Scattering models fitted without the effect may be far from those that fit best with it.
         let (start, held) = (space.restarted(&fit.at), space.costly(&fit.at));
         let again = self.problem.fit(&space, &start, &held, &SEARCH);
-        let gain = again.ln_likelihood - fit.ln_likelihood;
-        let is_as_likely = gain >= -SEARCH.tolerance;
-        let is_nearer = space.against(&again.at) < space.against(&fit.at);
+        // A law far from the stored one may be as likely as a near one, or hardly likelier.
+        let nearer = space.against(&fit.at) - space.against(&again.at);
+        let gain = again.ln_likelihood - fit.ln_likelihood + nearer;
         let has_arrived = again.converged && !fit.converged;
-        if gain > SEARCH.tolerance || is_as_likely && (has_arrived || is_nearer) {
+        if gain > SEARCH.tolerance || gain >= -SEARCH.tolerance && has_arrived {
             fit = if held.is_empty() {
                 again
             } else {

@@ -194,7 +194,10 @@ impl<'p> Search<'p> {
             }
             (self.notify)(&format!("round {round}: refitting with {}", trial.effect.name()));
             self.refit(state, trial);
-            best = best.max(trial.candidate.gain);
+            // What gains less than its parameters need is no measure for others.
+            if trial.candidate.gain >= least {
+                best = best.max(trial.candidate.gain);
+            }
             if trial.candidate.gain >= SHARE_OF_PROMISE * promised && !kept.contains(&trial.key()) {
                 kept.push(trial.key());
             }
@@ -318,13 +321,15 @@ impl<'p> Search<'p> {
         let here = screen.problem.ln_likelihood(&state.space, &state.fit.at);
         let held = state.space.costly(&state.fit.at);
         let most = trial.starts.first().map_or(0.0, |start| start.worth);
+        // Lobes in each other's place may be as likely as those stored.
+        let worth = |fit: &Fit| self.sample.weight * fit.ln_likelihood - space.against(&fit.at);
         let best = trial
             .starts
             .iter()
             .filter(|start| start.worth >= SHARE_OF_START * most)
             .map(|start| screen.problem.fit(space, &start.at, &held, &SCOUT))
             .filter(|fit| fit.ln_likelihood.is_finite())
-            .max_by(|a, b| a.ln_likelihood.total_cmp(&b.ln_likelihood));
+            .max_by(|a, b| worth(a).total_cmp(&worth(b)));
         let Some(mut best) = best else { return };
         // A fit that must move the scattering models far takes many steps.
         for _ in 0..LONGER {
