@@ -90,7 +90,9 @@ pub enum RegistrationError {
 #[derive(Debug, Error, PartialEq)]
 pub enum ReductionError {
     /// The registration has not converged.
-    #[error("the registration has not converged, and a curve needs a pose; give a rough pose that is nearer")]
+    #[error(
+        "the registration has not converged, and a curve needs a pose; give a rough pose that is nearer"
+    )]
     NotConverged,
     /// No such region.
     #[error("there is no region {region}; the target has {regions}")]
