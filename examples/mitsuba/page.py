@@ -23,8 +23,11 @@ def called(scores):
     for strength in STRENGTHS:
         for (truth, answer), count in scores[strength].confusion.items():
             said[truth][strength][answer] += count
-    words = lambda truth, counts: ", ".join(f"{'**' + a + '**' if a == truth else a} {n}" for a, n in counts.most_common()) or "-"
-    return [(truth, *(words(truth, by[s]) for s in STRENGTHS)) for truth, by in sorted(said.items())]
+    return [(truth, *(in_words(truth, by[s]) for s in STRENGTHS)) for truth, by in sorted(said.items())]
+
+
+def in_words(truth, counts):
+    return ", ".join(f"{'**' + a + '**' if a == truth else a} {n}" for a, n in counts.most_common()) or "-"
 
 
 def page(rows, scores, done, made_by):
@@ -54,7 +57,7 @@ def page(rows, scores, done, made_by):
         "How many hold the truth, of those that a report states:\n",
         table(("number", "hold", "of"), [(n, everything.held[n], c) for n, c in sorted(everything.stated.items())]),
         "## Time\n",
-        f"A diagnosis took {seconds[len(seconds) // 2]:.1f} s in the median and {seconds[-1]:.1f} s at worst, two at once.\n",
+        f"A diagnosis took {seconds[len(seconds) // 2]:.1f} s in the median and {seconds[-1]:.1f} s at worst, several at once.\n",
     ]
     for title, lines in lists:
         parts += [f"## {title}\n", "\n".join(f"- {line}" for line in lines) + "\n" if lines else "None.\n"]

@@ -174,7 +174,7 @@ impl Alarms {
         let Some(cells) = self.cells else {
             return Gate { cells: self.likely_cells(cell, threshold_w), away: 1.0 };
         };
-        let away = self.gate_m().map_or(1.0, |gate_m| 1.0 - (self.near_m / gate_m).min(MOST_NEAR));
+        let away = 1.0 - self.gate_m().map_or(0.0, |gate_m| share_near(self.near_m, gate_m));
         match self.returns {
             Returns::Strongest => Gate { cells, away },
             // Each cell for itself.
@@ -198,7 +198,7 @@ impl Alarms {
 
     /// How many false alarms lie near the target by chance, where others do not.
     pub(super) fn near_target(&self) -> f64 {
-        self.of_misses.len() as f64 * self.gate_m().map_or(0.0, |gate_m| odds(self.near_m / gate_m))
+        self.of_misses.len() as f64 * self.gate_m().map_or(0.0, |gate_m| odds(self.near_m, gate_m))
     }
 
     /// The likeliest number of cells.
@@ -275,9 +275,14 @@ pub(super) fn beyond_chance(count: usize, expected: f64) -> usize {
 /// Largest share of a gate near the target: none tells the noise.
 const MOST_NEAR: f64 = 0.999;
 
-/// How many lie in a part of a gate where one lies in the others.
-pub(super) fn odds(share: f64) -> f64 {
-    let share = share.min(MOST_NEAR);
+/// Share of a gate that lies near the target.
+fn share_near(near_m: f64, gate_m: f64) -> f64 {
+    (near_m / gate_m).min(MOST_NEAR)
+}
+
+/// How many false alarms lie near the target where one lies elsewhere in the gate.
+pub(super) fn odds(near_m: f64, gate_m: f64) -> f64 {
+    let share = share_near(near_m, gate_m);
     share / (1.0 - share)
 }
 
@@ -389,6 +394,10 @@ mod tests {
         let chirps = Chirps::draw(&Radar::default(), |_| Err("no file".to_owned())).unwrap();
         let shot = Shot::missed(&chirps, 0, 0.0);
         alarms.of_misses = vec![(shot, 8.0); alarms.powers_w.len()];
+        // A declared gate tells the part near the target, however few false alarms there are.
+        let few = Alarms { of_misses: vec![(shot, 8.0); 3], ..alarms.clone() };
+        assert!((few.near_target() - 1.0).abs() < 1e-9);
+        assert_eq!(Alarms { cells: None, ..few }.near_target(), 0.0);
         let ln_p = |step: &i32| {
             let noise_w = noise_w * 10f64.powf(f64::from(*step) / 1000.0);
             alarms.ln_p(&receiver(noise_w), LIMITS)

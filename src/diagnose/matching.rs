@@ -474,7 +474,7 @@ pub(super) fn expected_beside_edge(alarms: &Alarms, model: &Model, stage: &Stage
         edges_m.sort_by(f64::total_cmp);
         let apart_m = edges_m.windows(2).map(|pair| (pair[1] - pair[0]).min(2.0 * GATE_M));
         let near_m = apart_m.sum::<f64>() + if edges_m.is_empty() { 0.0 } else { 2.0 * GATE_M };
-        odds(near_m / gate_m)
+        odds(near_m, gate_m)
     });
     chances.sum()
 }
