@@ -90,6 +90,11 @@ impl Folds {
         sum_by_cell(values, &self.cell, self.cells)
     }
 
+    /// The same over whole patches: products of residuals that share speckle are alike beyond a cell.
+    pub(super) fn sum_over_patches(&self, values: &[f64]) -> [f64; 2] {
+        sum_by_cell(values, &self.block, self.blocks)
+    }
+
     /// Sum of one number per shot over each cell.
     pub(super) fn cell_sums(&self, values: &[f64]) -> Vec<f64> {
         sums_by_cell(values, &self.cell, self.cells)

@@ -215,8 +215,8 @@ impl<'a> Likelihood<'a> {
     /// ln of the power at the input of the receiver whose output is `ln_seen`, and the slope of the output by
     /// the input.
     fn entered(&self, ln_mean: f64, ln_seen: f64) -> (f64, f64) {
-        let passed = self.prediction.saturating.of(ln_mean);
-        (ln_mean + (ln_seen - passed.ln_mean) / passed.slope, passed.slope)
+        let [ln_ratio, slope] = self.prediction.saturating.entered(ln_mean, ln_seen);
+        (ln_mean + ln_ratio, slope)
     }
 
     /// ln p of the range of each shot; 0 where none is to be used.

@@ -15,12 +15,12 @@ use statrs::function::gamma::digamma;
 
 use super::evidence::Candidate;
 use super::field::Structure;
-use super::folds::{Folds, square};
+use super::folds::square;
 use super::likelihood::Likelihood;
 use super::observation::{Observation, ReceiverLimits};
 use super::score::DB;
 use super::shared::{ALONE, SharedSpeckle};
-use crate::effects::{Prediction, Shot};
+use crate::effects::{MeanEcho, Prediction, Shot};
 use crate::radar::random::{Key, Purpose};
 
 /// Standard deviations beyond which a shot is an outlier.
@@ -73,20 +73,23 @@ pub(super) fn z(
     all
 }
 
-/// Scatter of the powers of a prediction's shots by speckle, root mean square, dB.
+/// Scatter by speckle of the powers of a prediction's shots as they leave the receiver, root mean square, dB.
 pub(super) fn scatter_db(prediction: &Prediction) -> f64 {
-    let arrived = prediction.arrived.iter().enumerate();
-    let waves = arrived.filter_map(|(shot, one)| Some((shot, one.as_ref()?)));
-    let mut waves = waves.filter(|(_, one)| one.coherent_share > 0.0).peekable();
-    let alike_db = speckle_sd_db(prediction.receiver.looks);
-    if waves.peek().is_none() {
+    let Prediction { arrived, receiver, saturating, .. } = prediction;
+    let alike_db = speckle_sd_db(receiver.looks);
+    let is_alike = |echo: &MeanEcho| echo.coherent_share <= 0.0;
+    if saturating.is_linear() && arrived.iter().flatten().all(is_alike) {
         return alike_db;
     }
-    let count = prediction.arrived.len() as f64;
-    let less = waves.map(|(shot, one)| {
-        alike_db.powi(2) - speckle_sd_db(prediction.looks(shot, one.power_w)).powi(2)
-    });
-    (alike_db.powi(2) - less.sum::<f64>() / count).max(0.0).sqrt()
+    let of_shot = |(shot, echo): (usize, &Option<MeanEcho>)| {
+        let Some(echo) = echo else { return alike_db };
+        let ln_mean = (echo.power_w + receiver.noise_w).ln();
+        let [_, slope] = saturating.output(ln_mean, 0.0);
+        let looks = prediction.looks(shot, echo.power_w);
+        slope * if is_alike(echo) { alike_db } else { speckle_sd_db(looks) }
+    };
+    let squares = arrived.iter().enumerate().map(|shot| of_shot(shot).powi(2));
+    (squares.sum::<f64>() / arrived.len().max(1) as f64).sqrt()
 }
 
 /// Standard deviation of ln y of L looks in dB: 10/ln 10·√ψ′(L).
@@ -100,13 +103,13 @@ fn speckle_sd_db(looks: f64) -> f64 {
 ///
 /// Neighbours are up to six spots farther apart than `from_m`, up to which they may share speckle. In the first spot what they share
 /// is positive. Farther on it may be negative: waves a few spots long share nothing over their whole length, and speckle shares
-/// nothing in any part of it.
+/// nothing in any part of it. `sum_of`: sum of one number per shot with its standard error.
 pub(super) fn of_neighbours(
     z: &[f64],
     shots: &[Shot],
     [from_m, spot_m]: [f64; 2],
     sd_db: f64,
-    folds: &Folds,
+    sum_of: impl Fn(&[f64]) -> [f64; 2],
 ) -> ResidualStructure {
     let farthest_m = from_m + RINGS as f64 * spot_m;
     let mut members: HashMap<[i64; 2], Vec<usize>> = HashMap::new();
@@ -120,7 +123,7 @@ pub(super) fn of_neighbours(
         ResidualStructure { covariate: "neighbourhood".to_owned(), strength_db: 0.0, p_value: 1.0 };
     for ring in 0..RINGS {
         let of_ring: Vec<f64> = products.iter().map(|rings| rings[ring]).collect();
-        let [sum, se] = folds.sum(&of_ring);
+        let [sum, se] = sum_of(&of_ring);
         let [sum, sides] = if ring == 0 { [sum, 1.0] } else { [sum.abs(), 2.0] };
         let chance = 0.5 * sides * erfc(sum / se.max(f64::MIN_POSITIVE) / SQRT_2);
         let p_value = (RINGS as f64 * chance).min(1.0);

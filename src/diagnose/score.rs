@@ -69,6 +69,9 @@ pub(super) struct MomentTable {
 const FIRST: f64 = -8.0;
 const LAST: f64 = 6.0;
 const CELLS: usize = 560;
+/// Steps of an integral for a table, and of one for a single shot.
+const STEPS: usize = 400;
+const FEW_STEPS: usize = 60;
 /// Lowest mean below the threshold that counts, in e-folds.
 const FARTHEST: f64 = 100.0;
 
@@ -77,7 +80,12 @@ impl MomentTable {
     pub fn new(looks: f64) -> MomentTable {
         let mut knots = Vec::with_capacity(CELLS + 1);
         for k in 0..=CELLS {
-            knots.push(moments_above(looks, FIRST + (LAST - FIRST) * k as f64 / CELLS as f64));
+            knots.push(moments_above(
+                looks,
+                FIRST + (LAST - FIRST) * k as f64 / CELLS as f64,
+                STEPS,
+                |x| x,
+            ));
         }
         MomentTable { knots }
     }
@@ -96,26 +104,26 @@ impl MomentTable {
 
 /// Mean and variance of ln(y/mean) above ln(T/mean) for a number of looks without a table.
 fn moments(looks: f64, ln_threshold: f64) -> [f64; 2] {
-    let [mean, variance] = moments_above(looks, ln_threshold.clamp(FIRST, LAST));
+    let [mean, variance] = moments_above(looks, ln_threshold.clamp(FIRST, LAST), STEPS, |x| x);
     [mean + (ln_threshold - LAST).max(0.0), variance]
 }
 
-/// Mean and variance of ln(y/mean) above a threshold, by the midpoint rule from the threshold or, where that is
-/// lower, from where the density begins.
-fn moments_above(looks: f64, ln_threshold: f64) -> [f64; 2] {
-    const STEPS: usize = 400;
+/// Mean and variance of a function of ln(y/mean) above a threshold, by the midpoint rule from the threshold or, where that
+/// is lower, from where the density begins.
+fn moments_above(looks: f64, ln_threshold: f64, steps: usize, of: impl Fn(f64) -> f64) -> [f64; 2] {
     let reach = 12.0 / looks.sqrt().min(looks);
     let from = ln_threshold.max(-reach);
     let to = (from + 1.0 / looks).max(0.0) + 6.0 / looks.sqrt().max(1.0);
-    let width = (to - from) / STEPS as f64;
+    let width = (to - from) / steps as f64;
     let constant = looks * looks.ln() - ln_gamma(looks);
     let ln_density = |x: f64| constant + looks * (x - x.exp());
     let top = ln_density(from.max(0.0));
     let mut sums = [0.0; 3];
-    for step in 0..STEPS {
+    for step in 0..steps {
         let x = from + (step as f64 + 0.5) * width;
         let weight = (ln_density(x) - top).exp();
-        for (sum, power) in sums.iter_mut().zip([1.0, x, x * x]) {
+        let value = of(x);
+        for (sum, power) in sums.iter_mut().zip([1.0, value, value * value]) {
             *sum += weight * power;
         }
     }
@@ -171,13 +179,20 @@ fn detected_moments(
     for one in likelihood.means(shot) {
         let Mean { ln_mean, looks, weight } = one;
         // Detections far above their mean lie at the threshold.
-        let passed = prediction.saturating.of(ln_mean.max(ln_threshold - FARTHEST));
-        let from = (ln_threshold - passed.ln_mean) / passed.slope;
-        let is_tabulated = looks == prediction.receiver.looks;
-        let [mean, variance] = if is_tabulated { table.at(from) } else { moments(looks, from) };
-        let variance = passed.slope * passed.slope * variance;
+        let ln_mean = ln_mean.max(ln_threshold - FARTHEST);
+        let saturating = &prediction.saturating;
+        let [from, _] = saturating.entered(ln_mean, ln_threshold);
+        let [mean, variance] = if !saturating.is_linear() {
+            moments_above(looks, from.clamp(FIRST, LAST), FEW_STEPS, |x| {
+                saturating.output(ln_mean, x)[0]
+            })
+        } else {
+            let is_tabulated = looks == prediction.receiver.looks;
+            let [mean, variance] = if is_tabulated { table.at(from) } else { moments(looks, from) };
+            [ln_mean + mean, variance]
+        };
         let chance = if weight == 1.0 { 1.0 } else { likelihood.chance(&one) };
-        let (mean, weight) = (passed.ln_mean + passed.slope * mean, weight * chance.max(1e-300));
+        let weight = weight * chance.max(1e-300);
         for (sum, part) in sums.iter_mut().zip([1.0, mean, variance + mean * mean]) {
             *sum += weight * part;
         }

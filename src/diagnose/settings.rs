@@ -60,7 +60,7 @@ impl Default for Diagnosis {
             most_effects: 4,
             most_starts: 4,
             least_gain: 5.0,
-            standard_errors: 2.0,
+            standard_errors: 1.5,
             least_size_db: 0.1,
             least_structure_db: 0.15,
             family_error: 0.02,

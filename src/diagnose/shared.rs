@@ -36,6 +36,8 @@ const WIDTHS: std::ops::RangeInclusive<u32> = 2..=16;
 const WIDTH_STEP: f64 = 0.1;
 /// Distance, in widths, at which the kernel has fallen to 3·10⁻⁴.
 const KERNEL_REACH: f64 = 2.0;
+/// Distance, in widths, at which it has fallen to [`LEAST`].
+const KERNEL_END: f64 = 1.4;
 /// Share of a determinant below which it is rounding.
 const SINGULAR: f64 = 1e-12;
 /// Largest residual that counts, in standard deviations: a small bright place is not speckle.
@@ -122,7 +124,9 @@ impl SharedSpeckle {
             .collect();
         let all = |power: usize| sums.iter().map(|sums| sums[power]).sum::<f64>();
         let (cubes, weights) = (all(0) / all(1), sums.iter().map(|sums| 1.0 / sums[0]).collect());
-        SharedSpeckle { weights, cubes, reach_m: reach as f64 * lag_m, width_m: width * spot_m }
+        // The correlation of few independent places may fall short of its kernel by chance.
+        let reach_m = (reach as f64 * lag_m).max(KERNEL_END * width * spot_m);
+        SharedSpeckle { weights, cubes, reach_m, width_m: width * spot_m }
     }
 
     /// What shots share with those of so many chirps later, summed over all of a scan with so many `places` for chirps, as if it

@@ -272,7 +272,12 @@ impl<'a> Space<'a> {
     /// How much speaks against a point beside its likelihood, in ln p: the parameters in use of the last effect, and how
     /// far the laws are from those stored.
     pub fn against(&self, at: &DVector<f64>) -> f64 {
-        self.parameters_in_use(at) as f64 + off_the_stored(self.laws_with_places(), at)
+        self.parameters_in_use(at) as f64 + self.off_the_stored(at)
+    }
+
+    /// How far the laws are from those stored, in ln p.
+    pub fn off_the_stored(&self, at: &DVector<f64>) -> f64 {
+        off_the_stored(self.laws_with_places(), at)
     }
 
     /// The model of a scan at a point.

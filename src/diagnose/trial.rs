@@ -31,6 +31,8 @@ const STRENGTHS: [f64; 6] = [0.3, 1.0, 3.0, 7.0, 12.0, 20.0];
 const SHARE_OF_START: f64 = 0.7;
 /// A start that gains less than this share of its promise is moved by its gain instead.
 const SHARE_OF_WORD: f64 = 0.3;
+/// How far laws are from those stored, in ln p, from which on they may stand for an effect.
+const FAR_OFF: f64 = 3.0;
 /// Starts that the rest of a model is fitted to, and that search.
 const FOLLOWED_BY_LAWS: usize = 4;
 const FOLLOW: Minimise = Minimise { iterations: 4, tolerance: 0.5, patience: 2 };
@@ -226,12 +228,13 @@ impl<'p> Search<'p> {
         let is_absent = values.len() == 1 && starts.iter().all(|start| start.worth == 0.0);
         // Without an effect that bends the whole curve, such as a ceiling, the scattering models may be far from those
         // that fit best with it. Beside other effects they are near, but one on the scatter may gain only where they
-        // follow it.
+        // follow it. Laws far from those stored may stand for an effect that is still missing.
         let is_first = state.space.effects.is_empty() && !is_absent;
         let most = starts.first().map_or(0.0, |start| start.worth);
         let least = self.scorer.settings.least_gain_of(effect.parameters().len(), values.len());
         let mut has_far_start = false;
-        let far = if is_first || screen.leaves_laws_open {
+        let is_far_off = state.space.off_the_stored(&state.fit.at) > FAR_OFF;
+        let far = if is_first || screen.leaves_laws_open || is_far_off {
             let declared = state.space.restarted(&state.fit.at);
             likeliest(screen, &space, &joined(&declared, effect, &values))
                 .and_then(|best| likeliest(screen, &space, &of_all_strengths(effect, &best)))

@@ -73,12 +73,14 @@ impl Effect for Member {
         whole!(self.summary(values))
     }
 
-    /// Those of the whole effect in which only its own parameters are not absent.
+    /// Those of the whole effect in which only its own parameters are not absent, and these within their ranges.
     fn starts(&self, stage: &Stage, shots: &[Shot]) -> Vec<Vec<f64>> {
         let parameters = self.whole.parameters();
         let is_own = |start: &Vec<f64>| {
             let mut others = (0..parameters.len()).filter(|place| !self.used.contains(place));
+            let mut own = self.used.iter().zip(self.about.parameters);
             others.all(|place| start[place] == parameters[place].absent)
+                && own.all(|(&place, known)| (known.min..=known.max).contains(&start[place]))
         };
         let starts = self.whole.starts(stage, shots).into_iter().filter(is_own);
         starts.map(|start| self.used.iter().map(|&place| start[place]).collect()).collect()

@@ -132,7 +132,7 @@ impl Prediction {
     /// Mean power of a shot with thermal noise after the receiver, W.
     pub fn passed_w(&self, shot: usize) -> f64 {
         let mean_w = self.mean_w(shot);
-        if mean_w > 0.0 { self.saturating.of(mean_w.ln()).ln_mean.exp() } else { 0.0 }
+        if mean_w > 0.0 { self.saturating.ln_mean(mean_w.ln()).exp() } else { 0.0 }
     }
 
     /// Small relative changes of the shots' mean powers before the receiver as those after it.

@@ -1,4 +1,5 @@
-//! Facet slopes that differ along and across a grain: m·√q along it and m/√q across.
+//! Facet slopes that differ along and across a grain: m·√q along it and m/√q across. The grain may turn over the target, as
+//! that of wood or of a cloth that is laid over it.
 
 use crate::brdf::{Brdf, CookTorrance, Scattering};
 use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level};
@@ -27,13 +28,16 @@ const ABOUT: About = About {
     name: "anisotropy",
     level: Level::Material,
     description: "The surface is woven, brushed or machined: rougher along one direction than across it, by \
-         this ratio of the slopes; that direction is turned by turn_deg from the grain of its region.",
+         this ratio of the slopes; that direction is turned by turn_deg from the grain of its region, and \
+         by more from place to place.",
     signature: "At one angle of incidence the residual goes up and down twice in a full turn of the azimuth \
          about the normal. Spread over all azimuths it looks like a lobe of another width or an error \
          of the angle, which have no direction; a tilted pose has one, but goes up and down once.",
     parameters: &[
         EffectParameter::new("ratio", "1", [0.1, 10.0], 1.0, 0.1),
         EffectParameter::new("turn_deg", "deg", [-90.0, 90.0], 0.0, 10.0),
+        EffectParameter::new("turn_by_x_deg_per_m", "deg/m", [-400.0, 400.0], 0.0, 40.0),
+        EffectParameter::new("turn_by_y_deg_per_m", "deg/m", [-400.0, 400.0], 0.0, 40.0),
     ],
     conflicts: &[Conflict::OF_BACKSCATTER],
     has_one_form: false,
@@ -45,16 +49,23 @@ impl Effect for Anisotropy {
     }
 
     fn starts(&self, _stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
-        [[1.2, 0.0], [1.2, 45.0], [1.2, -45.0], [1.0 / 1.2, 0.0]].map(|v| v.to_vec()).to_vec()
+        let starts = [[1.2, 0.0], [1.2, 45.0], [1.2, -45.0], [1.0 / 1.2, 0.0]];
+        starts.map(|[ratio, turn_deg]| vec![ratio, turn_deg, 0.0, 0.0]).to_vec()
+    }
+
+    /// A grain of one direction, and one that turns.
+    fn members(&self) -> &'static [&'static [usize]] {
+        &[&[0, 1], &[0, 1, 2, 3]]
     }
 
     fn scatter(&self, values: &[f64], _: &Stage, law: &Brdf, shot: &Shot, f_per_sr: f64) -> f64 {
-        let &[ratio, turn_deg] = values else { return f_per_sr };
+        let &[ratio, turn_deg, by_x, by_y] = values else { return f_per_sr };
         if ratio == 1.0 {
             return f_per_sr;
         }
         let theta_rad = shot.hit.theta_rad();
         let retro = shot.to_radar();
+        let turn_deg = turn_deg + by_x * shot.xt_m + by_y * shot.yt_m;
         let turned = Direction::from_angles(theta_rad, shot.azimuth_rad - turn_deg.to_radians());
         rescaled(law, retro, f_per_sr, &|lobe| stretched(lobe, ratio).f_per_sr(turned, turned))
     }
@@ -74,11 +85,17 @@ mod tests {
             let mut shot = Shot { azimuth_rad, ..bench.shots[0] };
             shot.hit.cos_theta = 0.3f64.cos();
             let f = law.retro_per_sr(0.3);
-            Anisotropy.scatter(&[1.5, turn_deg], &bench.stage(), &law, &shot, f) / f
+            Anisotropy.scatter(&[1.5, turn_deg, 0.0, 0.0], &bench.stage(), &law, &shot, f) / f
         };
         assert!(found(0.0, 0.0) > 1.5);
         assert!(found(FRAC_PI_2, 0.0) < 0.7);
         assert!((found(FRAC_PI_2, 90.0) / found(0.0, 0.0) - 1.0).abs() < 1e-9);
+        // A grain that has turned by a right angle at a place.
+        let mut shot = Shot { azimuth_rad: 0.0, xt_m: 0.2, yt_m: -0.1, ..bench.shots[0] };
+        shot.hit.cos_theta = 0.3f64.cos();
+        let f = law.retro_per_sr(0.3);
+        let there = Anisotropy.scatter(&[1.5, 0.0, 300.0, -300.0], &bench.stage(), &law, &shot, f);
+        assert!((there / f / found(0.0, 90.0) - 1.0).abs() < 1e-9);
     }
 
     #[test]

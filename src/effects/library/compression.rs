@@ -1,8 +1,8 @@
 //! A receiver that saturates: P becomes P/(1 + (P/P_sat)^p)^(1/p), with the knee p (Rapp, Proc. 2nd
-//! Eur. Conf. Satell. Commun. (1991) 179, for powers).
+//! Eur. Conf. Satell. Commun. (1991) 179, for powers), or what comes to its ceiling faster than that
+//! (`effects/onset.rs`).
 //!
-//! The knee is a family by itself: 1 is the softest ceiling, 4 nearly a clip, and 1.3 within 0.2 dB of an amplitude that
-//! saturates as a hyperbolic tangent does.
+//! The knee is a family by itself: 1 is a soft ceiling, 4 nearly a clip.
 //!
 //! A receiver that saturates at once also compresses the speckle, each look by itself or the mean of all; a
 //! gain control slower than a chirp passes all of it.
@@ -29,10 +29,11 @@ const ABOUT: About = About {
          or place that is as strong. A rougher lobe or an error of the angle lowers the peak too, but \
          raises the flanks beside it.",
     parameters: &[
-        EffectParameter::new("saturation_dbm", "dB[mW]", [-90.0, NONE_DBM], NONE_DBM, 2.0),
+        EffectParameter::new("saturation_dbm", "dB[mW]", [-90.0, NONE_DBM], NONE_DBM, 0.4),
         EffectParameter::new("at_once", "1", [0.0, 1.0], 1.0, 0.2),
-        EffectParameter::new("knee", "1", [1.0, 4.0], 1.0, 0.2),
+        EffectParameter::new("knee", "1", [0.7, 4.0], 1.0, 0.2),
         EffectParameter::new("averaged", "1", [0.0, 1.0], 1.0, 0.2),
+        EffectParameter::new("approach", "1", [1.0, 20.0], 1.0, 0.5),
     ],
     conflicts: &[],
     has_one_form: false,
@@ -49,10 +50,21 @@ impl Effect for Compression {
         for level in -27..=-7 {
             let saturation_dbm = 3.0 * f64::from(level);
             for [at_once, averaged] in [[1.0, 1.0], [1.0, 0.0], [0.0, 1.0]] {
-                starts.push(vec![saturation_dbm, at_once, 1.5, averaged]);
+                starts.push(vec![saturation_dbm, at_once, 1.5, averaged, 1.0]);
             }
         }
         starts
+    }
+
+    /// Behind the average of the looks, before it, and slower than a chirp; the first two also with another approach.
+    fn members(&self) -> &'static [&'static [usize]] {
+        &[&[0, 2], &[0, 2, 3], &[0, 1, 2], &[0, 2, 4], &[0, 2, 3, 4]]
+    }
+
+    /// A receiver is one of the three, and not between.
+    fn searched(&self, parameter: usize) -> [f64; 2] {
+        let EffectParameter { min, max, .. } = ABOUT.parameters[parameter];
+        if matches!(parameter, 1 | 3) { [0.0, 0.0] } else { [min, max] }
     }
 
     fn form_error(&self, parameter: usize, _values: &[f64]) -> f64 {
@@ -61,9 +73,9 @@ impl Effect for Compression {
 
     fn receive(&self, values: &[f64], receiver: Receiver) -> Receiver {
         match *values {
-            [saturation_dbm, at_once, knee, averaged] if saturation_dbm < NONE_DBM => {
+            [saturation_dbm, at_once, knee, averaged, approach] if saturation_dbm < NONE_DBM => {
                 let saturation_w = watts_from_dbm(saturation_dbm);
-                let ceiling = Ceiling { saturation_w, knee, at_once, averaged };
+                let ceiling = Ceiling { saturation_w, knee, approach, at_once, averaged };
                 Receiver { ceiling, ..receiver }
             }
             _ => receiver,
@@ -78,29 +90,16 @@ mod tests {
 
     #[test]
     fn the_ceiling_is_soft() {
-        let receiver = Compression.receive(&[-40.0, 0.0, 1.0, 1.0], Receiver::LINEAR);
-        let after_db =
-            |power_w: f64| db(receiver.saturating().of(power_w.ln()).ln_mean.exp() / 1e-3);
+        let receiver = Compression.receive(&[-40.0, 0.0, 1.0, 1.0, 1.0], Receiver::LINEAR);
+        let after_db = |power_w: f64| db(receiver.saturating().ln_mean(power_w.ln()).exp() / 1e-3);
         assert!((after_db(1e-7) + 40.0 + db(2.0)).abs() < 1e-9);
         assert!((after_db(1.0) + 40.0).abs() < 1e-3);
         assert!((after_db(1e-12) + 90.0).abs() < 1e-3);
     }
 
-    /// √P becomes √P_sat·tanh √(P/P_sat), another form of saturation.
-    #[test]
-    fn a_hyperbolic_tangent_is_one_of_the_knees() {
-        let rapp = Ceiling { saturation_w: 1.0, knee: 1.306, at_once: 1.0, averaged: 1.0 };
-        let curve = rapp.over(f64::INFINITY);
-        for step in -300..=200 {
-            let power = 10f64.powf(f64::from(step) / 100.0);
-            let off_db = db(curve.of(power.ln()).ln_mean.exp() / power.sqrt().tanh().powi(2));
-            assert!(off_db.abs() < 0.2, "{power}: {off_db} dB");
-        }
-    }
-
     #[test]
     fn one_that_no_echo_comes_near_is_none() {
-        let receiver = Compression.receive(&[NONE_DBM, 1.0, 1.0, 1.0], Receiver::LINEAR);
+        let receiver = Compression.receive(&[NONE_DBM, 1.0, 1.0, 1.0, 1.0], Receiver::LINEAR);
         assert_eq!(receiver, Receiver::LINEAR);
     }
 }
