@@ -8,7 +8,7 @@ use crate::effects::Prediction;
 /// Change of the data between two predictions.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Size {
-    /// Root mean square change of the mean powers of the detections, dB.
+    /// Root mean square change of the mean powers of the detections, dB; of a ceiling the change of their spread, if larger.
     pub mean_db: f64,
     /// Change of the spread, dB.
     pub spread_db: f64,
@@ -24,6 +24,10 @@ impl Size {
         }
         let by_speckle = wider([after, before].map(scatter_db));
         let by_tilts = wider([after, before].map(tilt_spread_db));
+        // A ceiling holds the means and their scatter alike, and is no effect on the scatter.
+        if after.saturating != before.saturating {
+            return Size { mean_db: rms(&changes).max(by_speckle), spread_db: by_tilts };
+        }
         Size { mean_db: rms(&changes), spread_db: by_speckle.max(by_tilts) }
     }
 
