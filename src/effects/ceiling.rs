@@ -101,8 +101,14 @@ impl SaturationCurve {
 
     /// ln of the mean output, W, from ln of the mean power, W.
     pub fn ln_mean(&self, ln_mean: f64) -> f64 {
+        if self.is_linear() {
+            return ln_mean;
+        }
+        if self.looks >= STEADY {
+            return self.output(ln_mean, 0.0)[0];
+        }
         let below = ln_mean - self.ln_saturation - FIRST;
-        if self.is_linear() || below <= 0.0 {
+        if below <= 0.0 {
             return ln_mean;
         }
         let means = self.means.get_or_init(|| self.all_means());
@@ -214,9 +220,6 @@ struct Speckle {
 
 impl Speckle {
     fn new(looks: f64) -> Speckle {
-        if looks >= STEADY {
-            return Speckle { nodes: vec![(0.0, 1.0)] };
-        }
         let reach = REACH / looks.sqrt();
         let (from, to) = (-reach, reach.ln_1p());
         let node = |k: usize| {
@@ -251,8 +254,8 @@ mod tests {
 
     #[test]
     fn between_the_knots_the_curve_is_kept() {
-        let ceiling = Ceiling { saturation_w: 1.0, knee: 4.0, ..Ceiling::NONE };
-        let table = ceiling.over(f64::INFINITY);
+        let ceiling = Ceiling { saturation_w: 1.0, knee: 4.0, at_once: 0.0, ..Ceiling::NONE };
+        let table = ceiling.over(LOOKS);
         for k in 0..400 {
             let ln_mean = -10.0 + STEP * (f64::from(k) + 0.5);
             let off_db = crate::effects::testing::db(
