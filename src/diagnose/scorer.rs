@@ -218,9 +218,12 @@ impl Scorer<'_> {
         let sd_db = scatter_db(prediction);
         let spot_m = self.spot_m();
         let from_m = spot_m.max(self.problem.shared.reach_m);
-        let sum_of = |products: &[f64]| match self.problem.shared.is_any() {
-            true => self.folds.sum_over_patches(products),
-            false => self.folds.sum(products),
+        let sum_of = |products: &[f64]| {
+            if self.problem.shared.is_any() {
+                self.folds.sum_over_patches(products)
+            } else {
+                self.folds.sum(products)
+            }
         };
         residual::of_neighbours(z, self.problem.shots, [from_m, spot_m], sd_db, sum_of)
     }

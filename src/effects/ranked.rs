@@ -161,9 +161,9 @@ impl Looks {
         let size = (count * cells).next_power_of_two();
         let mut wave = vec![Complex64::ZERO; size];
         let mut last = 0.0;
-        for cell in 0..cells {
+        for (cell, value) in wave.iter_mut().take(cells).enumerate() {
             let next = below(cell + 1);
-            wave[cell].re = next - last;
+            value.re = next - last;
             last = next;
         }
         let mut planner = FftPlanner::new();
