@@ -182,14 +182,13 @@ fn detected_moments(
         let ln_mean = ln_mean.max(ln_threshold - FARTHEST);
         let saturating = &prediction.saturating;
         let [from, _] = saturating.entered(ln_mean, ln_threshold);
-        let [mean, variance] = if !saturating.is_linear() {
-            moments_above(looks, from.clamp(FIRST, LAST), FEW_STEPS, |x| {
-                saturating.output(ln_mean, x)[0]
-            })
-        } else {
+        let [mean, variance] = if saturating.is_linear() {
             let is_tabulated = looks == prediction.receiver.looks;
             let [mean, variance] = if is_tabulated { table.at(from) } else { moments(looks, from) };
             [ln_mean + mean, variance]
+        } else {
+            let output = |x| saturating.output(ln_mean, x)[0];
+            moments_above(looks, from.clamp(FIRST, LAST), FEW_STEPS, output)
         };
         let chance = if weight == 1.0 { 1.0 } else { likelihood.chance(&one) };
         let weight = weight * chance.max(1e-300);

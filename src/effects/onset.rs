@@ -68,6 +68,16 @@ mod tests {
     }
 
     #[test]
+    fn a_hyperbolic_tangent_is_nearly_a_knee_of_rapp() {
+        let onset = Onset { knee: 1.306, approach: 1.0 };
+        for step in -300..=200 {
+            let power = 10f64.powf(f64::from(step) / 100.0);
+            let off_db = db(onset.held(power.ln())[0].exp() / power.sqrt().tanh().powi(2));
+            assert!(off_db.abs() < 0.2, "{power}: {off_db} dB");
+        }
+    }
+
+    #[test]
     fn it_can_be_inverted() {
         for (knee, approach) in [(1.0, 1.0), (0.7, 20.0), (4.0, 3.0)] {
             let onset = Onset { knee, approach };

@@ -4,7 +4,7 @@
 //! the discrete Fourier transform. It is tabulated as the output that has the rank of a power P = x·P̄ of the Gamma
 //! distribution of L looks.
 
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, LazyLock, Mutex, OnceLock, PoisonError};
 
 use num_complex::Complex64;
 use rustfft::FftPlanner;
@@ -47,7 +47,9 @@ type Row = [[f64; 2]; INTERVALS + 1];
 
 /// The latest tables: a search asks for the same ones over and over.
 static LATEST: Mutex<Vec<Arc<Ranked>>> = Mutex::new(Vec::new());
-/// How many are kept.
+/// The plans of the transforms, which all rows share.
+static PLANNER: LazyLock<Mutex<FftPlanner<f64>>> = LazyLock::new(|| Mutex::new(FftPlanner::new()));
+/// How many tables are kept.
 const MOST_KEPT: usize = 16;
 
 impl Ranked {
@@ -166,10 +168,13 @@ impl Looks {
             value.re = next - last;
             last = next;
         }
-        let mut planner = FftPlanner::new();
-        planner.plan_fft_forward(size).process(&mut wave);
+        let [forward, inverse] = {
+            let mut planner = PLANNER.lock().unwrap_or_else(PoisonError::into_inner);
+            [planner.plan_fft_forward(size), planner.plan_fft_inverse(size)]
+        };
+        forward.process(&mut wave);
         wave.iter_mut().for_each(|value| *value = value.powu(count as u32));
-        planner.plan_fft_inverse(size).process(&mut wave);
+        inverse.process(&mut wave);
         // Ranks among their averages. A look in cell i is i + ½ cells on average.
         let whole = last.powi(count as i32);
         let (mut cell, mut sum, mut of_cell) = (0, 0.0, 0.0);

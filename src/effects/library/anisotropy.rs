@@ -29,7 +29,7 @@ const ABOUT: About = About {
     level: Level::Material,
     description: "The surface is woven, brushed or machined: rougher along one direction than across it, by \
          this ratio of the slopes; that direction is turned by turn_deg from the grain of its region, and \
-         by more from place to place.",
+         by turn_by_x_deg_per_m and turn_by_y_deg_per_m more for each metre of x_t and y_t.",
     signature: "At one angle of incidence the residual goes up and down twice in a full turn of the azimuth \
          about the normal. Spread over all azimuths it looks like a lobe of another width or an error \
          of the angle, which have no direction; a tilted pose has one, but goes up and down once.",
