@@ -112,6 +112,10 @@ impl Effect for InScans<'_> {
         self.effect.moves()
     }
 
+    fn widest_difference(&self) -> f64 {
+        self.effect.widest_difference()
+    }
+
     fn twists(&self, values: &[f64], stage: &Stage, shot: &Shot) -> Vec<Twist> {
         let mut twists = self.effect.twists(values, stage, shot);
         if !self.acts_on(shot.scan) {

@@ -137,6 +137,16 @@ impl<'a> Space<'a> {
         moving
     }
 
+    /// Widest step of a parameter of an effect over which a difference quotient is its slope.
+    fn widest_difference(&self, index: usize) -> f64 {
+        let mut first = self.base_len();
+        let of_it = self.effects.iter().find(|effect| {
+            first += effect.parameters().len();
+            index < first
+        });
+        of_it.map_or(f64::INFINITY, |effect| effect.widest_difference())
+    }
+
     /// How the target moves at every shot per unit of each of the unknowns of [`Space::moving`]. Of two effects that move
     /// the target the second is taken not to turn it.
     pub fn twists(&self, at: &DVector<f64>, views: &Views, shots: &[Shot]) -> Vec<Vec<Twist>> {
@@ -215,7 +225,7 @@ impl<'a> Space<'a> {
         laws_on_both_sides: bool,
     ) -> Difference {
         let is_law = index < self.base_len();
-        let step = if is_law { LAW_STEP } else { effect_step };
+        let step = if is_law { LAW_STEP } else { effect_step.min(self.widest_difference(index)) };
         let more = moved(at, bounds, index, step);
         let is_one_sided = is_law && !laws_on_both_sides && more[index] > at[index];
         let less = if is_one_sided { at.clone() } else { moved(at, bounds, index, -step) };

@@ -12,7 +12,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::onset::Onset;
+use super::onset::{Onset, OnsetTable, cubic};
 use super::ranked::Ranked;
 
 /// Number of looks from which speckle is neglected.
@@ -47,18 +47,19 @@ pub struct SaturationCurve {
     ceiling: Ceiling,
     looks: f64,
     ln_saturation: f64,
+    onset: OnsetTable,
     /// The output where single looks saturate; `None` where they do not, or where one is all.
     single: Option<Arc<Ranked>>,
-    /// ln(M/P_sat) of the mean output M over ln(P̄/P_sat), from [`FIRST`] in steps of [`STEP`].
-    means: OnceLock<Vec<f64>>,
+    /// ln(M/P_sat) of the mean output M and its slope by ln(P̄/P_sat), from [`FIRST`] in steps of [`STEP`].
+    means: OnceLock<Vec<[f64; 2]>>,
 }
 
 /// First ln(P̄/P_sat) of the table of means; below it the receiver is linear.
 const FIRST: f64 = -14.0;
 /// Last ln(P̄/P_sat) of the table; above it the output is constant.
 const LAST: f64 = 12.0;
-/// Step of the table in ln(P̄/P_sat), whose interpolation errs by 0.002 dB.
-const STEP: f64 = 0.05;
+/// Step of the table in ln(P̄/P_sat). Between its nodes cubics err by 0.0002 dB.
+const STEP: f64 = 0.125;
 
 impl Ceiling {
     /// No saturation.
@@ -78,18 +79,25 @@ impl Ceiling {
             && self.averaged < 1.0
             && looks < STEADY;
         let single = is_of_single_looks.then(|| Ranked::of(self.onset(), looks)).flatten();
-        SaturationCurve { ceiling: self, looks, ln_saturation, single, means: OnceLock::new() }
+        let onset = OnsetTable::new(self.onset());
+        SaturationCurve {
+            ceiling: self,
+            looks,
+            ln_saturation,
+            onset,
+            single,
+            means: OnceLock::new(),
+        }
     }
 
     fn onset(self) -> Onset {
         Onset { knee: self.knee, approach: self.approach }
     }
 
-    /// Averages what is found for a receiver slower than a chirp, for one behind the average of the looks, and for one
-    /// before it.
-    fn between(self, [slow, averaged, single]: [f64; 3]) -> f64 {
-        let at_once = single + self.averaged * (averaged - single);
-        slow + self.at_once * (at_once - slow)
+    /// Shares of a receiver slower than a chirp, of one behind the average of the looks, and of one before it.
+    fn shares(self) -> [f64; 3] {
+        let Ceiling { at_once, averaged, .. } = self;
+        [1.0 - at_once, at_once * averaged, at_once * (1.0 - averaged)]
     }
 }
 
@@ -113,27 +121,33 @@ impl SaturationCurve {
         }
         let means = self.means.get_or_init(|| self.all_means());
         let place = (below / STEP).min((means.len() - 1) as f64);
-        let cell = (place as usize).min(means.len() - 2);
-        let t = place - cell as f64;
-        self.ln_saturation + (1.0 - t) * means[cell] + t * means[cell + 1]
+        self.ln_saturation + cubic(means, STEP, place)[0]
     }
 
-    fn all_means(&self) -> Vec<f64> {
-        let onset = self.ceiling.onset();
+    fn all_means(&self) -> Vec<[f64; 2]> {
         let of_all = Speckle::new(self.looks);
         let of_each = if self.single.is_some() { Speckle::new(1.0) } else { of_all.clone() };
-        let mean = |speckle: &Speckle, ln_mean| {
-            let outputs =
-                speckle.nodes.iter().map(|(ln, weight)| weight * onset.held(ln_mean + ln)[0].exp());
-            outputs.sum::<f64>().ln()
-        };
-        let count = ((LAST - FIRST) / STEP) as usize;
+        let count = ((LAST - FIRST) / STEP).round() as usize;
         let ln_means = (0..=count).map(|k| FIRST + STEP * k as f64);
         let all = ln_means.map(|at| {
-            let kinds = [onset.held(at)[0], mean(&of_all, at), mean(&of_each, at)];
-            self.ceiling.between(kinds)
+            self.mixed(|kind| match kind {
+                0 => self.onset.held(at),
+                1 => of_all.mean_output(&self.onset, at),
+                _ => of_each.mean_output(&self.onset, at),
+            })
         });
         all.collect()
+    }
+
+    /// The mean of two numbers over the kinds of receiver, by their shares.
+    fn mixed(&self, of_kind: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
+        let mut sum = [0.0; 2];
+        for (kind, share) in self.ceiling.shares().into_iter().enumerate() {
+            if share > 0.0 {
+                sum.iter_mut().zip(of_kind(kind)).for_each(|(sum, value)| *sum += share * value);
+            }
+        }
+        sum
     }
 
     /// ln of the output, W, and its slope by ln P, for a power P, as ln(P/P̄), of which the mean P̄, W, is given by its
@@ -142,20 +156,19 @@ impl SaturationCurve {
         if self.is_linear() {
             return [ln_mean + ln_ratio, 1.0];
         }
-        let (onset, at_once) = (self.ceiling.onset(), self.ceiling.at_once);
         let mean = ln_mean - self.ln_saturation;
-        let averaged = onset.held(mean + ln_ratio);
-        let single = self
-            .single
-            .as_ref()
-            .and_then(|ranked| ranked.output(mean, ln_ratio))
-            .unwrap_or(averaged);
-        let slow = [onset.held(mean)[0] + ln_ratio, 1.0];
-        let [ln_out, slope] =
-            [0, 1].map(|k| self.ceiling.between([slow[k], averaged[k], single[k]]));
+        let averaged = || self.onset.held(mean + ln_ratio);
+        let slow = || [self.onset.held(mean)[0] + ln_ratio, 1.0];
+        let single = || self.single.as_ref().and_then(|ranked| ranked.output(mean, ln_ratio));
+        let [ln_out, slope] = self.mixed(|kind| match kind {
+            0 => slow(),
+            1 => averaged(),
+            _ => single().unwrap_or_else(averaged),
+        });
         // The rest passes as of a slow receiver.
-        let least = LEAST_PASSED * at_once;
-        let [ln_out, slope] = [ln_out + least * (slow[0] - ln_out), slope + least * (1.0 - slope)];
+        let least = LEAST_PASSED * self.ceiling.at_once;
+        let [ln_out, slope] =
+            [ln_out + least * (slow()[0] - ln_out), slope + least * (1.0 - slope)];
         [self.ln_saturation + ln_out, slope]
     }
 
@@ -165,20 +178,16 @@ impl SaturationCurve {
             return [ln_output - ln_mean, 1.0];
         }
         // The output rises with P: Newton's steps, or halves of the interval where they leave it.
-        let (mut low, mut high, mut at) = (-FARTHEST, FARTHEST, 0.0);
-        for (end, side) in [(low, -1.0), (high, 1.0)] {
-            let [output, slope] = self.output(ln_mean, end);
-            if side * (ln_output - output) >= 0.0 {
-                return [end, slope];
-            }
-        }
+        let (mut low, mut high, mut at) = (f64::NEG_INFINITY, f64::INFINITY, 0.0);
         let mut slope = 1.0;
         for _ in 0..60 {
             let [output, slope_here] = self.output(ln_mean, at);
-            (low, high) = if output < ln_output { (at, high) } else { (low, at) };
             slope = slope_here;
             let next = at + (ln_output - output) / slope;
-            let next = if low < next && next < high { next } else { 0.5 * (low + high) };
+            (low, high) = if next > at { (at, high) } else { (low, at) };
+            let is_within = low <= next && next <= high;
+            let next = if is_within { next } else { 0.5 * (low + high) };
+            let next = next.clamp(-FARTHEST, FARTHEST);
             if (next - at).abs() < 1e-8 {
                 break;
             }
@@ -232,6 +241,18 @@ impl Speckle {
         Speckle {
             nodes: nodes.into_iter().map(|(t, weight)| (t - mean.ln(), weight / sum)).collect(),
         }
+    }
+
+    /// ln of the mean output of a power, and its slope by ln of the mean power.
+    fn mean_output(&self, onset: &OnsetTable, ln_mean: f64) -> [f64; 2] {
+        let (mut sum, mut rise) = (0.0, 0.0);
+        for (ln_ratio, weight) in &self.nodes {
+            let [ln_held, slope] = onset.held(ln_mean + ln_ratio);
+            let output = weight * ln_held.exp();
+            sum += output;
+            rise += slope * output;
+        }
+        [sum.ln(), rise / sum]
     }
 }
 

@@ -74,6 +74,12 @@ pub trait Effect: Sync {
         &[]
     }
 
+    /// Widest step of a parameter, in its own steps, over which a difference quotient is its slope. Only facets that come
+    /// and go need a wide one.
+    fn widest_difference(&self) -> f64 {
+        f64::INFINITY
+    }
+
     /// Whether it acts on a scan.
     fn acts_on(&self, scan: u16) -> bool {
         self.scans().is_empty() || self.scans().contains(&scan)

@@ -94,6 +94,10 @@ impl Effect for Member {
         self.whole.moves()
     }
 
+    fn widest_difference(&self) -> f64 {
+        self.whole.widest_difference()
+    }
+
     fn whole(&self, values: &[f64]) -> Option<(&'static dyn Effect, Vec<f64>)> {
         Some((self.whole, self.whole_values(values)))
     }

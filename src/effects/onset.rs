@@ -4,6 +4,8 @@
 //! come to the ceiling faster, at last exponentially: p = 0.98 with q = 3.6 is within 0.01 dB of an amplitude that saturates as
 //! a hyperbolic tangent does.
 
+use std::sync::OnceLock;
+
 /// The onset of saturation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Onset {
@@ -36,6 +38,48 @@ impl Onset {
     }
 }
 
+/// An onset at equally spaced powers, with cubics between them that err by less than 1e-6. Computed on first use.
+#[derive(Clone, Debug)]
+pub(super) struct OnsetTable {
+    onset: Onset,
+    /// ln h and its slope by ln u.
+    nodes: OnceLock<Vec<[f64; 2]>>,
+}
+
+/// First and last ln u of the table, and its step.
+const FIRST: f64 = -14.0;
+const LAST: f64 = 12.0;
+const STEP: f64 = 0.05;
+
+impl OnsetTable {
+    pub fn new(onset: Onset) -> OnsetTable {
+        OnsetTable { onset, nodes: OnceLock::new() }
+    }
+
+    /// ln h of ln u, and its slope.
+    pub fn held(&self, ln_power: f64) -> [f64; 2] {
+        if !(FIRST..LAST).contains(&ln_power) {
+            return self.onset.held(ln_power);
+        }
+        let nodes = self.nodes.get_or_init(|| {
+            let count = ((LAST - FIRST) / STEP).round() as usize;
+            (0..=count).map(|node| self.onset.held(FIRST + STEP * node as f64)).collect()
+        });
+        cubic(nodes, STEP, (ln_power - FIRST) / STEP)
+    }
+}
+
+/// Value and slope between equally spaced nodes with values and slopes, at a place counted in nodes within them.
+pub(super) fn cubic(nodes: &[[f64; 2]], step: f64, place: f64) -> [f64; 2] {
+    let cell = (place as usize).min(nodes.len() - 2);
+    let t = place - cell as f64;
+    let [[a, slope_a], [b, slope_b]] = [nodes[cell], nodes[cell + 1]];
+    let [slope_a, slope_b, rise] = [slope_a * step, slope_b * step, b - a];
+    let [square, cube] = [3.0 * rise - 2.0 * slope_a - slope_b, slope_a + slope_b - 2.0 * rise];
+    let value = a + t * (slope_a + t * (square + t * cube));
+    [value, (slope_a + t * (2.0 * square + 3.0 * t * cube)) / step]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -51,6 +95,21 @@ mod tests {
                 let rapp = power * (1.0 + power.powf(knee)).powf(-1.0 / knee);
                 assert!((ln_held - rapp.ln()).abs() < 1e-9, "{knee} {power}");
                 assert!((slope - 1.0 / (1.0 + power.powf(knee))).abs() < 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn the_table_is_the_onset() {
+        for (knee, approach) in [(0.7, 1.0), (4.0, 1.0), (4.0, 20.0), (1.0, 3.0)] {
+            let onset = Onset { knee, approach };
+            let table = OnsetTable::new(onset);
+            for step in -1600..=1400 {
+                let ln_power = f64::from(step) / 99.0;
+                let [[ln_held, slope], [of_table, slope_of_table]] =
+                    [onset.held(ln_power), table.held(ln_power)];
+                assert!((ln_held - of_table).abs() < 1e-6, "{onset:?} {ln_power}");
+                assert!((slope - slope_of_table).abs() < 1e-4, "{onset:?} {ln_power}");
             }
         }
     }

@@ -10,7 +10,7 @@ use num_complex::Complex64;
 use rustfft::FftPlanner;
 use statrs::function::gamma::{gamma_lr, gamma_ur};
 
-use super::onset::Onset;
+use super::onset::{Onset, cubic};
 
 /// Looks from which on several form one.
 const MOST_SINGLE: f64 = 256.0;
@@ -112,13 +112,7 @@ impl Ranked {
             let [value, slope] = row[if beyond < 0.0 { 0 } else { INTERVALS }];
             return [value + slope * self.step * beyond, slope];
         }
-        let cell = (place as usize).min(INTERVALS - 1);
-        let t = place - cell as f64;
-        let [[a, slope_a], [b, slope_b]] = [row[cell], row[cell + 1]];
-        let [slope_a, slope_b, rise] = [slope_a * self.step, slope_b * self.step, b - a];
-        let [square, cube] = [3.0 * rise - 2.0 * slope_a - slope_b, slope_a + slope_b - 2.0 * rise];
-        let value = a + t * (slope_a + t * (square + t * cube));
-        [value, (slope_a + t * (2.0 * square + 3.0 * t * cube)) / self.step]
+        cubic(row, self.step, place)
     }
 }
 
@@ -185,12 +179,22 @@ impl Looks {
                 of_cell = (wave[cell].re / size as f64 / whole).max(0.0);
                 cell += 1;
             }
-            let part = if of_cell > 0.0 { ((share - sum) / of_cell).clamp(0.0, 1.0) } else { 0.0 };
-            let place = cell as f64 - 1.5 + part + 0.5 * count as f64;
-            outputs.push((width * place.max(0.5) / count as f64).ln());
+            // ln of the output is nearly straight over the logit of the share.
+            let right = cell as f64 - 0.5 + 0.5 * count as f64;
+            let [ln_left, ln_right] =
+                [right - 1.0, right].map(|place| (width * place.max(0.5) / count as f64).ln());
+            let [at, left, right] = [*share, sum, sum + of_cell].map(logit);
+            let part = (at - left) / (right - left);
+            let part = if part.is_finite() { part.clamp(0.0, 1.0) } else { 1.0 };
+            outputs.push(ln_left + part * (ln_right - ln_left));
         }
         outputs
     }
+}
+
+/// ln of the odds of a share, of 0 as of one that is negligible.
+fn logit(share: f64) -> f64 {
+    (share.max(1e-12) / (1.0 - share).max(1e-12)).ln()
 }
 
 /// Where something that holds of large numbers begins to hold.

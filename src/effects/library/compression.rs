@@ -36,7 +36,7 @@ const ABOUT: About = About {
         EffectParameter::new("approach", "1", [1.0, 20.0], 1.0, 0.5),
     ],
     conflicts: &[],
-    has_one_form: false,
+    has_one_form: true,
 };
 
 impl Effect for Compression {
@@ -65,6 +65,11 @@ impl Effect for Compression {
     fn searched(&self, parameter: usize) -> [f64; 2] {
         let EffectParameter { min, max, .. } = ABOUT.parameters[parameter];
         if matches!(parameter, 1 | 3) { [0.0, 0.0] } else { [min, max] }
+    }
+
+    /// Outputs near the ceiling hardly vary, and the ceiling is where they are to within that.
+    fn widest_difference(&self) -> f64 {
+        0.01
     }
 
     fn form_error(&self, parameter: usize, _values: &[f64]) -> f64 {
