@@ -9,7 +9,7 @@
 use std::path::Path;
 use std::time::Instant;
 
-use matdb::diagnose::{MeasuredScene, Report};
+use matdb::diagnose::{MeasuredScene, Options, Report};
 use matdb::effects::library;
 use matdb::measure::{Cloud, CloudPoint};
 use matdb::setup::ReadyScene;
@@ -87,7 +87,7 @@ fn diagnosed(scene: &Path, cloud: &Cloud) -> Result<Report, Failure> {
         sheets: &ready.sheets,
         declared_effects: model.as_ref().map_or(&[][..], |model| &model.effects),
     };
-    Ok(measured.diagnose(0, &library(), &|_| ())?)
+    Ok(measured.diagnose(Options { seed: 0, controls: true }, &library(), &|_| ())?)
 }
 
 /// The verdict and the names of a report.

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use super::earlier::check_folder;
 use super::recipients::{check_fit_name, find_recipient};
 use super::scene_after::{AFTER, after_of, check_beside};
-use crate::diagnose::{DiagnoseError, MeasuredScene, Report, declared_receiver, diagnose_together};
+use crate::diagnose::{
+    DiagnoseError, MeasuredScene, Options, Report, declared_receiver, diagnose_together,
+};
 use crate::effects::{About, Antenna, BeamSpot, Effect, RangeCell, SecondBounce, Setting, library};
 use crate::error::Error;
 use crate::files::folder_of;
@@ -41,6 +43,8 @@ pub struct CloudRequest<'a> {
     pub material: Option<&'a str>,
     /// Seed of everything random.
     pub seed: u64,
+    /// Whether controls are computed.
+    pub controls: bool,
     /// Folder of the report.
     pub folder: &'a Path,
     /// Whether what is found will be stored.
@@ -328,8 +332,9 @@ impl CheckedRequest<'_> {
                 declared_effects,
             });
         }
-        let (seed, effects) = (self.request.seed, &self.choice.tried);
-        let mut report = diagnose_together(&measured, seed, effects, hear)?;
+        let CloudRequest { seed, controls, .. } = self.request;
+        let options = Options { seed, controls };
+        let mut report = diagnose_together(&measured, options, &self.choice.tried, hear)?;
         for (part, name) in report.clouds.iter_mut().zip(self.request.clouds()) {
             part.name = name.display().to_string();
         }

@@ -18,9 +18,18 @@ use crate::effects::Effect;
 pub(super) fn controls(
     search: &Search,
     base: &State,
-    effects: &[&dyn Effect],
+    members: &[&dyn Effect],
     numbers: usize,
 ) -> Controls {
+    // The first member of each family.
+    let (mut effects, mut names) = (Vec::new(), Vec::new());
+    for effect in members {
+        let name = (effect.name(), effect.scans());
+        if !names.contains(&name) {
+            names.push(name);
+            effects.push(*effect);
+        }
+    }
     let ((placebo, equal_df_spline), injection_recovery) = rayon::join(
         || (placebo(&search.scorer, base, numbers), spline(&search.scorer, base, numbers)),
         || effects.par_iter().map(|effect| recover(search, base, *effect)).collect(),

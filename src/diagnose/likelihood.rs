@@ -118,14 +118,17 @@ impl<'a> Likelihood<'a> {
             powers.flatten().map(|(power_w, _)| (power_w + noise_w).max(floor_w)).collect();
         ln_all(&mut ln_means);
         let mut laws = Vec::with_capacity(ln_means.len());
+        let mut ln_entered = Vec::with_capacity(ln_means.len());
         for (ln_means, ((shot, seen), ln_seen)) in
             ln_means.chunks_exact(tilts).zip(seen.iter().zip(&ln_seen))
         {
             for (ln_mean, (power_w, _)) in ln_means.iter().zip(prediction.powers_w(*shot)) {
                 let law = self.law(prediction.looks(*shot, power_w));
+                let entered = self.entered(*ln_mean, *ln_seen);
+                ln_entered.push(entered[0]);
                 laws.push(match seen.power_w {
-                    Some(_) => self.detected(&law, *ln_seen, *ln_mean),
-                    None => self.limited(&law, *ln_seen, *ln_mean),
+                    Some(_) => detected(&law, entered, *ln_mean),
+                    None => law.below(entered[0], *ln_mean),
                 });
             }
         }
@@ -149,17 +152,21 @@ impl<'a> Likelihood<'a> {
         if tilts > 1 {
             ln_means = seen.iter().map(|(shot, _)| prediction.mean_w(*shot).max(floor_w)).collect();
             ln_all(&mut ln_means);
+            let means = ln_means.iter().zip(&ln_seen);
+            ln_entered =
+                means.map(|(ln_mean, ln_seen)| self.entered(*ln_mean, *ln_seen)[0]).collect();
         }
         let ranges = self.ranges(seen);
-        let each = seen.iter().zip(&ln_seen).zip(ln_means).zip(powers).zip(ln_p).zip(ranges);
-        each.map(|(((((&(shot, _), ln_seen), ln_mean), power), ln_p), range)| {
+        let lost = ln_seen.iter().zip(ln_entered).map(|(ln_seen, ln_entered)| ln_entered - ln_seen);
+        let each = seen.iter().zip(lost).zip(ln_means).zip(powers).zip(ln_p).zip(ranges);
+        each.map(|(((((&(shot, _), lost), ln_mean), power), ln_p), range)| {
             let weight = self.shared.weight(shot);
             let arrived = prediction.arrived.get(shot).copied().flatten();
             let looks = prediction.looks(shot, arrived.map_or(0.0, |arrived| arrived.power_w));
             let most_pull = MOST_PULL * looks.sqrt();
             Term {
                 ln_p: weight * ln_p + range.ln_p,
-                ln_mean: ln_mean - (self.entered(ln_mean, *ln_seen).0 - ln_seen),
+                ln_mean: ln_mean - lost,
                 slope: weight * power.slope / power.p,
                 pull: weight * power.pull.clamp(-most_pull, most_pull),
                 bend: weight * power.bend / power.p,
@@ -187,7 +194,8 @@ impl<'a> Likelihood<'a> {
 
     /// Probability that a power of this mean stays below a level, W.
     fn below_of(&self, mean: &Mean, level_w: f64) -> f64 {
-        self.limited(&self.law(mean.looks), level_w.ln(), mean.ln_mean).value.exp()
+        let [ln_entered, _] = self.entered(mean.ln_mean, level_w.ln());
+        self.law(mean.looks).below(ln_entered, mean.ln_mean).value.exp()
     }
 
     /// The law of so many looks.
@@ -199,24 +207,11 @@ impl<'a> Likelihood<'a> {
         }
     }
 
-    /// ln density of a detected power per unit of ln power.
-    fn detected(&self, law: &GammaLaw, ln_power: f64, ln_mean: f64) -> LnProbability {
-        let (ln_power, slope) = self.entered(ln_mean, ln_power);
-        let law = law.detected(ln_power, ln_mean);
-        let ln_slope = if slope == 1.0 { 0.0 } else { slope.ln() };
-        LnProbability { value: law.value - ln_slope, ..law }
-    }
-
-    /// ln probability that the power stays below a limit.
-    fn limited(&self, law: &GammaLaw, ln_limit: f64, ln_mean: f64) -> LnProbability {
-        law.below(self.entered(ln_mean, ln_limit).0, ln_mean)
-    }
-
     /// ln of the power at the input of the receiver whose output is `ln_seen`, and the slope of the output by
     /// the input.
-    fn entered(&self, ln_mean: f64, ln_seen: f64) -> (f64, f64) {
+    fn entered(&self, ln_mean: f64, ln_seen: f64) -> [f64; 2] {
         let [ln_ratio, slope] = self.prediction.saturating.entered(ln_mean, ln_seen);
-        (ln_mean + ln_ratio, slope)
+        [ln_mean + ln_ratio, slope]
     }
 
     /// ln p of the range of each shot; 0 where none is to be used.
@@ -258,6 +253,13 @@ impl<'a> Likelihood<'a> {
         found.iter_mut().zip(ln_p).for_each(|(range, ln_p)| range.ln_p = ln_p);
         found
     }
+}
+
+/// ln density of a detected power per unit of ln power, from what entered a receiver and the slope of its output.
+fn detected(law: &GammaLaw, [ln_entered, slope]: [f64; 2], ln_mean: f64) -> LnProbability {
+    let law = law.detected(ln_entered, ln_mean);
+    let ln_slope = if slope == 1.0 { 0.0 } else { slope.ln() };
+    LnProbability { value: law.value - ln_slope, ..law }
 }
 
 /// The mean of a power, with thermal noise.

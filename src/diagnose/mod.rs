@@ -82,7 +82,7 @@ pub use report::{
     MeshPose, Parameters, Power, Report, Row, SCHEMA, Triple, Value, Verdict,
 };
 pub use residual::{MAY_BE, ResidualStructure};
-pub use scan::{MeasuredScene, declared_receiver, diagnose_together};
+pub use scan::{MeasuredScene, Options, declared_receiver, diagnose_together};
 pub use score::Errors;
 pub use settings::Diagnosis;
 pub use shots::trace_shots;

@@ -92,17 +92,12 @@ impl Diagnosis {
         let strays = StrayCounts::of(&scorer, subject, &choice.model.state)?;
         refuse_a_poor_fit(&scorer.errors(&choice.model.state.held_out))?;
 
-        notify("controls");
-        // The first member of each family.
-        let mut simplest = members;
-        let mut names = Vec::new();
-        simplest.retain(|effect| {
-            let name = (effect.name(), effect.scans());
-            let is_first = !names.contains(&name);
-            names.push(name);
-            is_first
-        });
-        let controls = controls(&search, base, &simplest, numbers_of_controls(&choice.ranking));
+        let controls = if self.controls {
+            notify("controls");
+            controls(&search, base, &members, numbers_of_controls(&choice.ranking))
+        } else {
+            Controls::default()
+        };
 
         notify("testing the remainder");
         Ok(report(subject, &search, &choice, strays, controls))

@@ -35,6 +35,8 @@ pub struct Diagnosis {
     pub family_error: f64,
     /// Random signs drawn for each residual test.
     pub draws: usize,
+    /// Whether controls are computed.
+    pub controls: bool,
 }
 
 impl Diagnosis {
@@ -65,6 +67,7 @@ impl Default for Diagnosis {
             least_structure_db: 0.15,
             family_error: 0.02,
             draws: 4999,
+            controls: true,
         }
     }
 }

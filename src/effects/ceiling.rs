@@ -157,19 +157,23 @@ impl SaturationCurve {
             return [ln_mean + ln_ratio, 1.0];
         }
         let mean = ln_mean - self.ln_saturation;
-        let averaged = || self.onset.held(mean + ln_ratio);
-        let slow = || [self.onset.held(mean)[0] + ln_ratio, 1.0];
-        let single = || self.single.as_ref().and_then(|ranked| ranked.output(mean, ln_ratio));
+        let [ln_out, slope] = self.output_of(mean, self.onset.held(mean)[0], ln_ratio);
+        [self.ln_saturation + ln_out, slope]
+    }
+
+    /// [`SaturationCurve::output`] in units of P_sat, where that of the mean is known.
+    fn output_of(&self, ln_mean: f64, held_mean: f64, ln_ratio: f64) -> [f64; 2] {
+        let averaged = || self.onset.held(ln_mean + ln_ratio);
+        let slow = [held_mean + ln_ratio, 1.0];
+        let single = || self.single.as_ref().and_then(|ranked| ranked.output(ln_mean, ln_ratio));
         let [ln_out, slope] = self.mixed(|kind| match kind {
-            0 => slow(),
+            0 => slow,
             1 => averaged(),
             _ => single().unwrap_or_else(averaged),
         });
         // The rest passes as of a slow receiver.
         let least = LEAST_PASSED * self.ceiling.at_once;
-        let [ln_out, slope] =
-            [ln_out + least * (slow()[0] - ln_out), slope + least * (1.0 - slope)];
-        [self.ln_saturation + ln_out, slope]
+        [ln_out + least * (slow[0] - ln_out), slope + least * (1.0 - slope)]
     }
 
     /// ln(P/P̄) of the power P whose output, W, is given by its logarithm, and the slope there.
@@ -177,21 +181,25 @@ impl SaturationCurve {
         if self.is_linear() {
             return [ln_output - ln_mean, 1.0];
         }
+        let mean = ln_mean - self.ln_saturation;
+        let held_mean = self.onset.held(mean)[0];
+        let sought = ln_output - self.ln_saturation;
         // The output rises with P: Newton's steps, or halves of the interval where they leave it.
         let (mut low, mut high, mut at) = (f64::NEG_INFINITY, f64::INFINITY, 0.0);
         let mut slope = 1.0;
         for _ in 0..60 {
-            let [output, slope_here] = self.output(ln_mean, at);
+            let [output, slope_here] = self.output_of(mean, held_mean, at);
             slope = slope_here;
-            let next = at + (ln_output - output) / slope;
+            let next = at + (sought - output) / slope;
             (low, high) = if next > at { (at, high) } else { (low, at) };
             let is_within = low <= next && next <= high;
             let next = if is_within { next } else { 0.5 * (low + high) };
             let next = next.clamp(-FARTHEST, FARTHEST);
-            if (next - at).abs() < 1e-8 {
+            let is_there = (next - at).abs() < 1e-6;
+            at = next;
+            if is_there {
                 break;
             }
-            at = next;
         }
         [at, slope]
     }

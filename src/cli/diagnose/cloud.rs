@@ -40,6 +40,7 @@ pub(super) fn run(
         effects: &effects,
         material: args.material.as_deref(),
         seed: args.seed,
+        controls: !args.no_controls,
         folder: &args.output,
         add: args.add,
     };
