@@ -303,3 +303,37 @@ fn local(terms: &[Term], slopes: &[Vec<Slope>], counts: impl Fn(usize) -> bool) 
     }
     sum
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::Diagnosis;
+    use crate::diagnose::tests::searched;
+    use crate::effects::{family, find};
+
+    /// Outputs at a ceiling vary so little that ln p is no parabola over the usual step of a parameter.
+    #[test]
+    fn a_ceiling_is_found_where_it_is_likeliest() {
+        let settings = Diagnosis { seed: 4, ..Diagnosis::default() };
+        let [saturation_dbm, knee] = [-52.0, 1.5];
+        let truth = vec![saturation_dbm, 1.0, knee, 1.0, 1.0];
+        let compression = find("compression").unwrap();
+        searched((compression, truth), &settings, &|search, space| {
+            let (problem, member) = (&search.scorer.problem, family(compression)[0]);
+            let with = space.with(member);
+            let start = Space::joined(&space.start(), member, &[saturation_dbm + 0.5, knee]);
+            let fit = problem.fit(&with, &start, &[], &SEARCH);
+            let found = &with.effect_values(&fit.at)[0];
+            assert!(fit.converged && (found[0] - saturation_dbm).abs() < 0.3, "{fit:?}");
+            // No point beside it is likelier by more than the search promises.
+            for index in 0..fit.at.len() {
+                for step in [0.003, -0.003, 0.03, -0.03] {
+                    let mut beside = fit.at.clone();
+                    beside[index] += step;
+                    let gain = problem.ln_likelihood(&with, &beside) - fit.ln_likelihood;
+                    assert!(gain < SEARCH.tolerance, "{index} {step}: {gain}");
+                }
+            }
+        });
+    }
+}

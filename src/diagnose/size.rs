@@ -25,7 +25,7 @@ impl Size {
         let by_speckle = wider([after, before].map(scatter_db));
         let by_tilts = wider([after, before].map(tilt_spread_db));
         // A ceiling holds the means and their scatter alike, and is no effect on the scatter.
-        if after.saturating != before.saturating {
+        if after.receiver.ceiling != before.receiver.ceiling {
             return Size { mean_db: rms(&changes).max(by_speckle), spread_db: by_tilts };
         }
         Size { mean_db: rms(&changes), spread_db: by_speckle.max(by_tilts) }
@@ -56,4 +56,29 @@ fn wider([a, b]: [f64; 2]) -> f64 {
 
 fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::{Ceiling, MeanEcho, Receiver};
+
+    #[test]
+    fn looks_spread_and_a_ceiling_shifts() {
+        let predicted = |receiver: Receiver| Prediction {
+            arrived: vec![Some(MeanEcho::at_once(1e-7, 8.0))],
+            tilts: Vec::new(),
+            receiver,
+            saturating: receiver.saturating(),
+        };
+        let four = Receiver { looks: 4.0, ..Receiver::LINEAR };
+        let two = Receiver { looks: 2.0, ..four };
+        let ceiling = Ceiling { saturation_w: 1e-7, ..Ceiling::NONE };
+        let observed = [Observation::detected(1e-7, None)];
+        let size = |receiver| Size::of(&observed, &predicted(four), &predicted(receiver));
+        let looks = size(two);
+        assert!(looks.is_spread() && looks.mean_db == 0.0 && looks.spread_db > 1.0, "{looks:?}");
+        let held = size(Receiver { ceiling, ..four });
+        assert!(!held.is_spread() && held.mean_db > 1.0, "{held:?}");
+    }
 }

@@ -486,7 +486,7 @@ mod tests {
     #[test]
     fn the_first_effect_is_also_searched_from_the_laws_as_declared() {
         let settings = Diagnosis { seed: 5, ..Diagnosis::default() };
-        searched((&BOWL, -6.0), &settings, &|search, space| {
+        searched((&BOWL, vec![-6.0]), &settings, &|search, space| {
             let (declared, base) = (space.start(), search.scorer.base(search.sample, space));
             let first = trial(search, &base);
             let laws = base.space.base_len() - 1;

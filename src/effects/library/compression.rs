@@ -69,7 +69,7 @@ impl Effect for Compression {
 
     /// Outputs near the ceiling hardly vary, and the ceiling is where they are to within that.
     fn widest_difference(&self) -> f64 {
-        0.01
+        0.001
     }
 
     fn form_error(&self, parameter: usize, _values: &[f64]) -> f64 {
