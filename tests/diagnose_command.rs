@@ -435,6 +435,16 @@ fn complete_data_lack_nothing_and_json_is_the_report() {
     assert_eq!(printed["verdict"], "no-missing-effect", "{printed}");
     let html = page(&at.join("report/report.html"));
     assert!(html.contains("Nothing is missing") && !html.contains("--add"));
+    // Without controls the answer is the same, and they are said to be missing.
+    let flags = ["--json", "--no-controls"];
+    let output = matdb(at).args(DIAGNOSE).args(flags).output().unwrap();
+    let bare: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let mut expected = printed;
+    let found = expected["controls"]["injection_recovery"].as_array().unwrap().len();
+    assert_eq!(found, 2);
+    expected["controls"] =
+        json!({"placebo": null, "equal_df_spline": null, "injection_recovery": []});
+    assert_eq!(bare, expected);
 }
 
 /// The page, after checking that it stands alone, is well-formed and nothing in it is a scene's.

@@ -111,7 +111,7 @@ def diagnose(program, folder, seed):
         return {"verdict": "crash", "status": added.returncode, "words": added.stderr.strip()}
     run = subprocess.run(
         [program.path, "--db", db, "-q", "diagnose", os.path.join(folder, "cloud.ply"),
-         "--scene", os.path.join(folder, "scene.toml"), "--seed", str(seed), "-o", out],
+         "--scene", os.path.join(folder, "scene.toml"), "--seed", str(seed), "--no-controls", "-o", out],
         capture_output=True, text=True)
     result = {
         "key": program.key, "commit": program.commit, "inputs": inputs(folder),
