@@ -10,7 +10,8 @@ use crate::adopt::{MeasurementStorage, StoredMeasurement};
 use crate::error::Error;
 use crate::files::write_all;
 use crate::material::SourceKind;
-use crate::measure::{Curve, Metric, Reduction, Registration};
+use crate::measure::freedom::Freedom;
+use crate::measure::{Curve, Metric, Reduction, Registration, Start};
 use crate::report::{MeasurementReport, MeasurementRequest};
 use crate::scene::Scene;
 use crate::setup::Database;
@@ -39,6 +40,9 @@ pub(super) struct Args {
     /// Use the found pose even where the points agree with the given one
     #[arg(long)]
     refine: bool,
+    /// Take the given pose as it is: nothing is registered
+    #[arg(long, conflicts_with = "refine")]
+    keep_pose: bool,
     /// What the registration minimises
     #[arg(long, default_value = "along-ray")]
     metric: MetricFlag,
@@ -129,6 +133,12 @@ fn storage(args: &Args) -> Option<MeasurementStorage<'_>> {
 
 fn registration(args: &Args) -> Result<Registration, Error> {
     let start = start(args.pose.as_deref())?;
+    if args.keep_pose && start == Start::Automatic {
+        return Err(Error::usage(
+            "--keep-pose has no pose to keep",
+            "give --pose X,Y,Z[,RX,RY,RZ], or leave out --pose auto",
+        ));
+    }
     let registration = match args.metric {
         MetricFlag::AlongRay => Registration::default(),
         MetricFlag::PointToPlane => {
@@ -136,7 +146,7 @@ fn registration(args: &Args) -> Result<Registration, Error> {
         }
         MetricFlag::PointToPoint => Registration::paper(),
     };
-    Ok(Registration { start, keep_given: !args.refine, ..registration })
+    Ok(Registration { start, keep_given: !args.refine, keep: args.keep_pose, ..registration })
 }
 
 fn reduction(args: &Args) -> Result<Reduction, Error> {
@@ -154,12 +164,20 @@ fn text(args: &Args, measured: &MeasurementReport, stored: Option<&StoredMeasure
     let MeasurementReport { registered, reduced, .. } = measured;
     let middle = registered.pivot;
     let shift_mm = 1e3 * (middle.xyz - (registered.pose.inverse() * middle).xyz);
-    let sd: [f64; 6] = std::array::from_fn(|axis| registered.covariance[axis][axis].sqrt());
+    let sd: [f64; 6] = std::array::from_fn(|axis| registered.told_covariance[axis][axis].sqrt());
     let [shift_sd_m, turn_sd_rad] =
         [&sd[..3], &sd[3..]].map(|sd| sd.iter().copied().fold(0.0, f64::max));
     let (curve, left_out) = (&reduced.curve, reduced.left_out);
     let detected = curve.detected().count();
-    let kept = if registered.kept {
+    let free: Vec<String> = registered.free.iter().map(Freedom::to_string).collect();
+    let held = if free.is_empty() {
+        String::new()
+    } else {
+        format!("the points do not tell, and the given pose keeps: {}\n", free.join("; "))
+    };
+    let kept = if args.keep_pose {
+        "the given pose is kept\n"
+    } else if registered.kept {
         "the points agree with the given pose, which is kept; --refine uses the found one\n"
     } else {
         ""
@@ -169,7 +187,7 @@ fn text(args: &Args, measured: &MeasurementReport, stored: Option<&StoredMeasure
             format!("stored the curve as `{curve}` in {material}@{revision}\n")
         });
     format!(
-        "{kept}pose: {} of {} points on the surface, rms {:.2} mm, known to {:.2} mm and {:.3}° (1 sd)\n\
+        "{kept}{held}pose: {} of {} points on the surface, rms {:.2} mm, known to {:.2} mm and {:.3}° (1 sd)\n\
          shift of the middle of the points: {:.2}, {:.2}, {:.2} mm\n\
          curve: {} detections and {} censored chirps from {:.1}° to {:.1}°\n\
          reduced with {}; {}\n\

@@ -15,6 +15,9 @@ use crate::frames::{Global, Point, Pose};
 const LEAST_REACH_M: f64 = 0.02;
 /// Pairs farther apart sideways than this many times the median lie beyond the edge of the virtual scan.
 const BEYOND_THE_EDGE: f64 = 4.0;
+/// Directions with less than this share of the best one's information are left to the loop along the rays, which knows what
+/// the points tell: a sphere would turn from facet to facet.
+const WEAKEST_SHARE: f64 = 1e-3;
 /// With a smaller share of points near the mesh, the clouds do not overlap.
 const LEAST_OVERLAP: f64 = 0.2;
 
@@ -144,5 +147,5 @@ fn closing(view: &View, settings: &Registration, pairs: &[Pair]) -> Pose<Global,
     let gaps: Vec<Gap> = pairs.iter().map(Pair::gap).collect();
     let sd_m = bulk_sd_m(gaps.iter().map(|gap| gap.size_m)).max(LEAST_SD_M);
     let weighted = gaps.iter().map(|gap| (*gap, settings.kernel.weight(gap.size_m / sd_m)));
-    NormalEquations::new(weighted, view.pivot, view.length_m).solve().about(view.pivot)
+    NormalEquations::new(weighted, view.pivot, view.length_m).solve(WEAKEST_SHARE).about(view.pivot)
 }

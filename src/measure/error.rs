@@ -106,12 +106,7 @@ pub enum ReductionError {
     #[error(transparent)]
     Cloud(#[from] RegistrationError),
     /// No detection became a row.
-    #[error(
-        "no detection became a row: {} miss the target, {} lie off its surface, {} are of other regions, {} near an \
-         edge and {} on a facet that the pose leaves uncertain; choose another region, a smaller edge margin or a \
-         target whose shape tells its pose",
-        .0.missed, .0.off_surface, .0.other_region, .0.near_edge, .0.unsure_of_facet
-    )]
+    #[error("no detection became a row: {}", reasons(.0))]
     NoRows(Exclusions),
     /// The radar of the scene could not have detected this.
     #[error(
@@ -243,6 +238,27 @@ pub enum CalibrationError {
         /// Chirps that the target answers.
         expected: usize,
     },
+}
+
+/// How many detections are left out for each reason, and what lets them in.
+fn reasons(left_out: &Exclusions) -> String {
+    let Exclusions { missed, off_surface, other_region, near_edge, unsure_of_facet, .. } =
+        *left_out;
+    let all = [
+        (missed, "beside the target", "check the mesh and --pose"),
+        (off_surface, "off its surface", "check the mesh and --pose"),
+        (other_region, "of other regions", "choose another --region"),
+        (near_edge, "near an edge or another region", "give a smaller --edge-margin"),
+        (
+            unsure_of_facet,
+            "on facets that the pose leaves uncertain",
+            "give --keep-pose where it is known",
+        ),
+    ];
+    let some = all.into_iter().filter(|(count, ..)| *count > 0);
+    let words: Vec<String> =
+        some.map(|(count, what, way_out)| format!("{count} {what} ({way_out})")).collect();
+    if words.is_empty() { "the cloud has none".to_owned() } else { words.join(", ") }
 }
 
 /// A distance as a person would say it.

@@ -11,10 +11,9 @@
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{Matrix3, Matrix6, SymmetricEigen, Vector6};
 
+use super::freedom::Untold;
 use crate::frames::{Global, Pose};
 
-/// Directions with less than this share of the best one's information are not moved along.
-const WEAKEST_SHARE: f64 = 1e-7;
 /// From the median of |x| to the standard deviation of a Gaussian.
 const SD_PER_MEDIAN: f64 = 1.4826;
 
@@ -97,6 +96,20 @@ impl Motion {
         Pose::new(rotation, pivot + self.shift_m - rotation * pivot)
     }
 
+    /// Shift and turn from a vector of both, m, in which the turn is multiplied by a length, m.
+    pub fn from_scaled(scaled: &Vector6<f64>, length_m: f64) -> Motion {
+        let [x, y, z, turn_x, turn_y, turn_z] = (*scaled).into();
+        let turn_rad = DVec3::new(turn_x, turn_y, turn_z) / length_m;
+        Motion { shift_m: DVec3::new(x, y, z), turn_rad }
+    }
+
+    /// The vector of [`Motion::from_scaled`].
+    pub fn scaled(&self, length_m: f64) -> Vector6<f64> {
+        let parts =
+            self.shift_m.to_array().into_iter().chain((self.turn_rad * length_m).to_array());
+        Vector6::from_iterator(parts)
+    }
+
     /// The motion that a map is about a pivot.
     pub fn of(pose: &Pose<Global, Global>, pivot: DVec3) -> Motion {
         let moved = (*pose * crate::frames::Point::from(pivot)).xyz;
@@ -129,8 +142,17 @@ impl NormalEquations {
         NormalEquations { information, pull_m, length_m }
     }
 
-    /// The motion that closes the gaps best, without any along directions that no gap constrains.
-    pub fn solve(&self) -> Motion {
+    /// The equations of the told part of a motion alone.
+    pub(super) fn without(&self, untold: &Untold) -> NormalEquations {
+        let along = |twist: &Vector6<f64>| twist * twist.transpose();
+        let others = Matrix6::identity() - untold.twists.iter().map(along).sum::<Matrix6<f64>>();
+        let information = others * self.information * others;
+        NormalEquations { information, pull_m: others * self.pull_m, ..*self }
+    }
+
+    /// The motion that closes the gaps best, without any along directions with less than this share of the best one's
+    /// information.
+    pub fn solve(&self, weakest_share: f64) -> Motion {
         // The decomposition would not end.
         if !self.information.iter().chain(self.pull_m.iter()).all(|sum| sum.is_finite()) {
             return Motion::default();
@@ -141,13 +163,11 @@ impl NormalEquations {
         for (value, axis) in
             std::iter::zip(eigen.eigenvalues.iter(), eigen.eigenvectors.column_iter())
         {
-            if *value > WEAKEST_SHARE * best {
+            if *value > weakest_share * best {
                 step += axis * (axis.dot(&self.pull_m) / value);
             }
         }
-        let [x, y, z, turn_x, turn_y, turn_z] = step.into();
-        let turn_rad = DVec3::new(turn_x, turn_y, turn_z) / self.length_m;
-        Motion { shift_m: DVec3::new(x, y, z), turn_rad }
+        Motion::from_scaled(&step, self.length_m)
     }
 }
 
@@ -247,7 +267,7 @@ mod tests {
             let size_m = gradient.dot((pose * Point::from(at)).xyz - at);
             (Gap { at, gradient, size_m }, 1.0)
         });
-        let found = NormalEquations::new(gaps, pivot, 0.4).solve();
+        let found = NormalEquations::new(gaps, pivot, 0.4).solve(1e-7);
         // The second order of the turn, 1e-8 rad² over half a metre, is not modelled.
         assert!((found.shift_m - truth.shift_m).length() < 2e-8);
         assert!((found.turn_rad - truth.turn_rad).length() < 4e-8);
@@ -260,7 +280,7 @@ mod tests {
             let at = scatter(&mut draws) * DVec3::new(1.0, 1.0, 0.0);
             (Gap { at, gradient: DVec3::Z, size_m: 0.01 }, 1.0)
         });
-        let found = NormalEquations::new(gaps, DVec3::ZERO, 0.4).solve();
+        let found = NormalEquations::new(gaps, DVec3::ZERO, 0.4).solve(1e-7);
         assert!((found.shift_m - 0.01 * DVec3::Z).length() < 1e-12);
         assert!(found.turn_rad.length() < 1e-12);
     }

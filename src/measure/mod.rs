@@ -11,6 +11,7 @@ mod coarse;
 pub mod compare;
 pub mod curve;
 mod error;
+pub mod freedom;
 pub mod icp;
 pub mod in_plane;
 pub mod incidence;

@@ -47,6 +47,8 @@ pub struct Registration {
     /// Keep a pose given by hand when the points do not speak against it, at 5 %: it may be known
     /// better than from the points, and on flat facets a tenth of a millimetre moves angles by degrees.
     pub keep_given: bool,
+    /// Keep the given pose whatever the points say.
+    pub keep: bool,
 }
 
 impl Default for Registration {
@@ -65,6 +67,7 @@ impl Default for Registration {
             farthest_m: 0.25,
             farthest_rad: 0.5,
             keep_given: true,
+            keep: false,
         }
     }
 }

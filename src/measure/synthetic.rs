@@ -20,6 +20,8 @@ pub fn exact() -> RegistrationResult {
     RegistrationResult {
         pose: Pose::from_euler_xyz(DVec3::ZERO, DVec3::ZERO),
         covariance: [[0.0; 6]; 6],
+        told_covariance: [[0.0; 6]; 6],
+        free: vec![],
         pivot: Point::new(0.0, 0.0, 0.0),
         kept: false,
         rms_m: 0.0,
@@ -105,6 +107,39 @@ impl SyntheticScan {
         self.cloud = Cloud::new(points).unwrap();
         self
     }
+}
+
+/// A cylinder along y, about the origin.
+pub fn cylinder(radius_m: f64, height_m: f64, sides: usize) -> Mesh {
+    let ring = |y: f64| {
+        (0..sides).map(move |side| {
+            let (sin, cos) = (std::f64::consts::TAU * side as f64 / sides as f64).sin_cos();
+            DVec3::new(radius_m * sin, y, radius_m * cos)
+        })
+    };
+    let vertices = ring(-0.5 * height_m).chain(ring(0.5 * height_m)).collect();
+    let sides = sides as u32;
+    let facets = (0..sides).flat_map(|side| {
+        let next = (side + 1) % sides;
+        [[side, next, next + sides], [side, next + sides, side + sides]]
+    });
+    Mesh { vertices, facets: facets.collect(), labels: Vec::new() }
+}
+
+/// A mesh stretched along each axis.
+pub fn stretched(mut mesh: Mesh, by: DVec3) -> Mesh {
+    mesh.vertices.iter_mut().for_each(|vertex| *vertex *= by);
+    mesh
+}
+
+/// A mesh turned about the axes, degrees.
+pub fn turned(mut mesh: Mesh, by_deg: DVec3) -> Mesh {
+    let pose = Pose::<Global, Global>::from_euler_xyz(
+        by_deg * (std::f64::consts::PI / 180.0),
+        DVec3::ZERO,
+    );
+    mesh.vertices.iter_mut().for_each(|v| *v = (pose * Point::from(*v)).xyz);
+    mesh
 }
 
 /// The built-in mannequin.

@@ -12,55 +12,59 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 use nalgebra::{Matrix6, SymmetricEigen, Vector6};
 
+use super::freedom::Untold;
 use super::icp::{Gap, NormalEquations, jacobian};
 
 /// Side of a cell, three spots of the paper's radar, m.
 const CELL_M: f64 = 0.05;
 /// With fewer cells the shared errors cannot be estimated.
 const LEAST_CELLS: usize = 30;
-/// A direction with a larger standard deviation is reported as not determined, m.
-const UNKNOWN_SD_M: f64 = 5e-3;
 
 /// The uncertainty of a pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Uncertainty {
-    /// Covariance of shift (m) and turn (rad) about the pivot.
+    /// Covariance of shift (m) and turn (rad) about the pivot; along untold twists that of the size of the target.
     pub covariance: [[f64; 6]; 6],
+    /// The part of the told twists.
+    pub told: [[f64; 6]; 6],
     /// Factor on the variance for shared errors, 1 or more.
     pub widened: f64,
-    /// Directions in which the points do not determine the pose, in words.
-    pub unknown: Vec<String>,
+    /// Twists that the points do not tell.
+    pub untold: Untold,
 }
 
-/// The covariance of the pose from the gaps that were used, where their squares are least.
-pub(super) fn uncertainty(gaps: &[Gap], pivot: DVec3, length_m: f64) -> Uncertainty {
-    /// A thousandth of one point's information: rounding of a plane's zero is far below.
-    const LEAST_INFORMATION: f64 = 1e-3;
+/// The covariance of the pose from the gaps that were used, where their squares are least. `are_shared`: whether neighbours may
+/// share errors.
+pub(super) fn uncertainty(
+    gaps: &[Gap],
+    pivot: DVec3,
+    length_m: f64,
+    are_shared: bool,
+) -> Uncertainty {
     let equations = NormalEquations::new(gaps.iter().map(|gap| (*gap, 1.0)), pivot, length_m);
     let freedom = gaps.len().saturating_sub(6).max(1) as f64;
     let variance_m2 = gaps.iter().map(|gap| gap.size_m * gap.size_m).sum::<f64>() / freedom;
     let eigen = SymmetricEigen::new(equations.information);
-    let widened = widening(gaps, pivot, length_m, variance_m2, &eigen);
-    // The variance along each direction; where the points do not determine it, the size of the target squared.
-    let mut scaled = Matrix6::zeros();
-    let mut unknown = Vec::new();
+    let widened =
+        if are_shared { widening(gaps, pivot, length_m, variance_m2, &eigen) } else { 1.0 };
+    let untold = Untold::of(&equations.information, (variance_m2 * widened).sqrt(), length_m);
+    let mut told = Matrix6::zeros();
     for (value, axis) in std::iter::zip(eigen.eigenvalues.iter(), eigen.eigenvectors.column_iter())
     {
-        let estimated_m2 = variance_m2 * widened / value.max(0.0);
-        let blind = *value < LEAST_INFORMATION;
-        let variance_m2 =
-            if blind { length_m * length_m } else { estimated_m2.min(length_m * length_m) };
-        if blind || estimated_m2.sqrt() > UNKNOWN_SD_M {
-            unknown.push(in_words(&axis.into_owned(), variance_m2.sqrt()));
+        let axis = axis.into_owned();
+        if untold.tells(&axis) {
+            told += axis * axis.transpose() * (variance_m2 * widened / value);
         }
-        scaled += axis * axis.transpose() * variance_m2;
     }
+    let of_size = untold.twists.iter().map(|twist| twist * twist.transpose() * length_m.powi(2));
+    let covariance = told + of_size.sum::<Matrix6<f64>>();
     // Turns were scaled by the length.
     let per_m = 1.0 / length_m;
     let unit = [1.0, 1.0, 1.0, per_m, per_m, per_m];
-    let covariance =
-        std::array::from_fn(|i| std::array::from_fn(|j| scaled[(i, j)] * unit[i] * unit[j]));
-    Uncertainty { covariance, widened, unknown }
+    let [covariance, told] = [covariance, told].map(|scaled| {
+        std::array::from_fn(|i| std::array::from_fn(|j| scaled[(i, j)] * unit[i] * unit[j]))
+    });
+    Uncertainty { covariance, told, widened, untold }
 }
 
 /// Variance with errors shared within cells over variance with independent errors.
@@ -92,26 +96,6 @@ fn widening(
     }
     let mean = ratios.iter().sum::<f64>() / ratios.len().max(1) as f64;
     mean.max(1.0)
-}
-
-/// A direction of the six by its largest parts.
-fn in_words(axis: &Vector6<f64>, sd_m: f64) -> String {
-    const NAMES: [&str; 6] = [
-        "a shift along x",
-        "a shift along y",
-        "a shift along z",
-        "a turn about x",
-        "a turn about y",
-        "a turn about z",
-    ];
-    // Parts below a third hardly change the direction.
-    let large = std::iter::zip(axis.iter(), NAMES).filter(|(part, _)| part.abs() > 0.33);
-    let names: Vec<&str> = large.map(|(_, name)| name).collect();
-    format!(
-        "the points do not determine {}: standard deviation {:.0} mm",
-        names.join(" with "),
-        1e3 * sd_m
-    )
 }
 
 #[cfg(test)]
@@ -148,28 +132,28 @@ mod tests {
     #[test]
     fn independent_errors_give_the_textbooks_covariance() {
         let gaps = wall(0.0);
-        let known = uncertainty(&gaps, DVec3::splat(0.5), 0.4);
+        let known = uncertainty(&gaps, DVec3::splat(0.5), 0.4, true);
         // The mean of six χ² ratios over 400 cells scatters by some 3 %.
         assert!(known.widened < 1.1, "{}", known.widened);
         // z: σ² over Σ n_z², with n_z² = 4/(4 + χ²₂), on average 0.72.
         let sd_m = known.covariance[2][2].sqrt();
         let expected_m = SD_M / (0.72 * gaps.len() as f64).sqrt();
         assert!((sd_m / expected_m - 1.0).abs() < 0.1, "{sd_m} {expected_m}");
-        assert!(known.unknown.is_empty());
+        assert!(known.untold.twists.is_empty() && known.told == known.covariance);
     }
 
     #[test]
     fn errors_that_neighbours_share_widen_it() {
         // With n points a cell and a correlation ρ a common pull grows by 1 + (n − 1)·ρ = 8.5; leaning
         // normals share less of it: along x and y the signs differ.
-        let known = uncertainty(&wall(0.5), DVec3::splat(0.5), 0.4);
+        let known = uncertainty(&wall(0.5), DVec3::splat(0.5), 0.4, true);
         assert!((3.0..8.5).contains(&known.widened), "{}", known.widened);
     }
 
     #[test]
     fn nothing_at_all_is_known_of_nothing() {
-        let known = uncertainty(&[], DVec3::ZERO, 0.4);
-        assert_eq!(known.unknown.len(), 6);
+        let known = uncertainty(&[], DVec3::ZERO, 0.4, true);
+        assert_eq!(known.untold.twists.len(), 6);
         assert!((known.covariance[0][0] - 0.16).abs() < 1e-12);
     }
 }

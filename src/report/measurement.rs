@@ -8,6 +8,7 @@ use super::json::json_file;
 use crate::effects::{Setting, find};
 use crate::error::Error;
 use crate::formats::figure::{Plot, Series, Style};
+use crate::measure::freedom::Freedom;
 use crate::measure::{Cloud, Curve, Reduction, ReductionResult, Registration, RegistrationResult};
 use crate::scene::Scene;
 use crate::units::db_from_ratio;
@@ -149,6 +150,7 @@ fn pose_record(
         "given_pose_kept": registered.kept,
         "converged": registered.converged,
         "stop": format!("{:?}", registered.stop).to_lowercase(),
+        "held": registered.free.iter().map(Freedom::to_string).collect::<Vec<_>>(),
         "verdicts": registered.verdicts,
         "curve": {
             "detected": detected,
