@@ -416,14 +416,6 @@ mod tests {
                 let start = Start::Given(given);
                 let found = measured.register(&Registration { start, ..Default::default() });
                 let found = found.unwrap_or_else(|error| panic!("{name} {seed}: {error}"));
-                eprintln!(
-                    "{name} {seed} {:?} inl {}/{} {:?} {:?}",
-                    found.converged,
-                    found.inliers,
-                    found.points,
-                    found.free.iter().map(|x| x.to_string()).collect::<Vec<_>>(),
-                    found.pose
-                );
                 assert!(found.converged, "{name} {seed}");
                 let shifts =
                     found.free.iter().filter(|one| matches!(one, Freedom::Shift(_))).count();
