@@ -21,13 +21,17 @@ def grid_faces(rows, columns, offset=0):
     return np.concatenate([np.stack([a, c, b], -1).reshape(-1, 3), np.stack([b, c, d], -1).reshape(-1, 3)])
 
 
-def cap_mesh(centre, radius, fine=0.003, coarse=0.010, azimuths=180):
-    """Front half of a sphere, in rings about +z: fine where a narrow lobe needs it."""
+def cap_mesh(centre, radius, fine=0.003, coarse=0.005, azimuths=360):
+    """Front half of a sphere, in rings about +z: fine where a narrow lobe needs it, and everywhere within a few hundredths of
+    a millimetre of the sphere, which thousands of ranges tell."""
     ring = np.concatenate([np.arange(1e-4, 0.45, fine), np.arange(0.45, 1.62, coarse)])
     phi = np.linspace(0, 2 * np.pi, azimuths + 1)
     t, p = np.meshgrid(ring, phi, indexing="ij")
     v = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], -1).reshape(-1, 3)
-    return centre + radius * v, grid_faces(len(ring), len(phi))
+    # A little outside, so that the facets are on the sphere in the mean.
+    wide = np.where(t < 0.45, fine, coarse)
+    out = 1 + (wide**2 + (np.sin(t) * phi[1]) ** 2) / 12
+    return centre + radius * out.reshape(-1, 1) * v, grid_faces(len(ring), len(phi))
 
 
 def tube_mesh(p0, p1, radius, step=0.0025):
