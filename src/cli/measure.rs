@@ -173,7 +173,7 @@ fn text(args: &Args, measured: &MeasurementReport, stored: Option<&StoredMeasure
     let held = if free.is_empty() {
         String::new()
     } else {
-        format!("the points do not tell, and it stays as given: {}\n", free.join("; "))
+        format!("the points do not tell: {}\n", free.join("; "))
     };
     let kept = if args.keep_pose {
         "the given pose is kept\n"

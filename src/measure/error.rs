@@ -265,3 +265,17 @@ fn reasons(left_out: &Exclusions) -> String {
 fn distance(off_m: f64) -> String {
     if off_m.is_finite() { format!("{:.0} mm off", 1e3 * off_m) } else { "beside".to_owned() }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_reason_is_counted_with_its_way_out() {
+        let left_out = Exclusions { near_edge: 7, unsure_of_facet: 3, ..Exclusions::default() };
+        let words = ReductionError::NoRows(left_out).to_string();
+        assert!(words.contains("7 near an edge or another region (give a smaller --edge-margin)"));
+        assert!(words.contains("3 on facets that the pose leaves uncertain (give --keep-pose"));
+        assert!(!words.contains("beside the target"), "{words}");
+    }
+}

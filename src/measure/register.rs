@@ -61,7 +61,7 @@ pub struct RegistrationResult {
     pub covariance: [[f64; 6]; 6],
     /// The same without the motions of `free`: they leave the surface in itself, and with it what the radar sees.
     pub told_covariance: [[f64; 6]; 6],
-    /// Motions that the points do not tell, in which the given pose is held.
+    /// Motions that the points do not tell. [`Metric::AlongRay`] holds the rough pose in them, the other metrics may move along.
     pub free: Vec<Freedom>,
     /// Median of the measured points by axis.
     pub pivot: Point<Global>,
@@ -471,6 +471,17 @@ mod tests {
         // seeds; five of them, and the widening, which only makes the covariance larger.
         let mean = normalised / SEEDS as f64;
         assert!((1.5..11.0).contains(&mean), "{mean}");
+    }
+
+    #[test]
+    fn a_pose_to_be_kept_is_kept_though_it_is_wrong() {
+        let measured = mannequin(2e-3, 4);
+        let given = pushed(&measured, 5e-3, 0.5f64.to_radians(), 4);
+        let settings =
+            Registration { start: Start::Given(given), keep: true, ..Default::default() };
+        let found = measured.register(&settings).unwrap();
+        assert!(found.kept && found.converged && found.pose == given, "{found:?}");
+        assert!(found.rms_m > 2.1e-3, "{}", found.rms_m);
     }
 
     #[test]

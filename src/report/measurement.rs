@@ -150,7 +150,7 @@ fn pose_record(
         "given_pose_kept": registered.kept,
         "converged": registered.converged,
         "stop": format!("{:?}", registered.stop).to_lowercase(),
-        "held": registered.free.iter().map(Freedom::to_string).collect::<Vec<_>>(),
+        "free": registered.free.iter().map(Freedom::to_string).collect::<Vec<_>>(),
         "verdicts": registered.verdicts,
         "curve": {
             "detected": detected,

@@ -67,7 +67,7 @@ impl Effect for Compression {
         if matches!(parameter, 1 | 3) { [0.0, 0.0] } else { [min, max] }
     }
 
-    /// Outputs near the ceiling hardly vary, and the ceiling is where they are to within that.
+    /// Outputs near the ceiling vary by hundredths of a decibel, over which ln p is a parabola of the ceiling.
     fn widest_difference(&self) -> f64 {
         0.001
     }
