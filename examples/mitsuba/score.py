@@ -94,6 +94,20 @@ def judge(answer, truth, gains):
     return "not in the data" if min(gains.values()) < IN_THE_DATA else kind, good, said
 
 
+def outcome(case, truth, answer, gains):
+    """What became of a case: all that a score counts, as JSON can hold it."""
+    kind, good, said = judge(answer, truth, gains)
+    return {
+        "case": case, "kind": kind, "right": bool(good), "truth": "+".join(truth["labels"]) or "none",
+        "names": bool(said), "said": "+".join(said) or answer["verdict"], "seconds": answer.get("seconds"),
+        "held": [(name, bool(holds)) for name, *_, holds in intervals(answer, truth)],
+        "intervals": [
+            f"{case} {truth['base']}: interval of {name}: {value:.4g} +- {sd:.2g}, truth {true:.4g}"
+            for name, value, sd, true, holds in intervals(answer, truth) if not holds],
+        "words": in_words(case, truth, answer, gains, said) if not good or kind == "not in the data" else "",
+    }
+
+
 class Score:
     """What became of cases, by their kind."""
 
@@ -103,22 +117,22 @@ class Score:
         self.alarms, self.confusion = collections.Counter(), collections.Counter()
         self.misses, self.apart, self.seconds = [], [], []
 
-    def add(self, case, truth, answer, gains):
-        kind, good, said = judge(answer, truth, gains)
+    def add(self, one):
+        """Counts an outcome."""
+        kind, good = one["kind"], one["right"]
         self.total[kind] += 1
         self.right[kind] += good
-        for name, value, sd, true, holds in intervals(answer, truth):
+        for name, holds in one["held"]:
             self.stated[name] += 1
             self.held[name] += holds
-            if not holds:
-                self.misses.append(f"{case} {truth['base']}: interval of {name}: {value:.4g} +- {sd:.2g}, truth {true:.4g}")
-        self.confusion["+".join(truth["labels"]) or "none", "+".join(said) or answer["verdict"]] += 1
+        self.misses += one["intervals"]
+        self.confusion[one["truth"], one["said"]] += 1
         if kind == "complete" and not good:
-            self.alarms["named" if said else answer["verdict"]] += 1
-        if "seconds" in answer:
-            self.seconds.append(answer["seconds"])
-        if not good or kind == "not in the data":
-            (self.apart if kind == "not in the data" else self.misses).append(in_words(case, truth, answer, gains, said))
+            self.alarms["named" if one["names"] else one["said"]] += 1
+        if one["seconds"] is not None:
+            self.seconds.append(one["seconds"])
+        if one["words"]:
+            (self.apart if kind == "not in the data" else self.misses).append(one["words"])
 
     def update(self, other):
         for name in ("right", "total", "held", "stated", "alarms", "confusion"):
@@ -184,7 +198,7 @@ def main():
     for name, answer in zip(names, answers):
         with open(os.path.join(truths, f"{name}.json")) as file:
             truth = json.load(file)
-        score.add(name, truth, answer, expected_gain(truth, folder))
+        score.add(outcome(name, truth, answer, expected_gain(truth, folder)))
     score.print()
     if arguments.strict and (not names or score.right != score.total):
         raise SystemExit(1)

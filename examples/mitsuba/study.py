@@ -1,11 +1,12 @@
 """The study of false alarms and the judgement over all effects: make the cases, diagnose them, print one table.
 
 Stop it at any point. The next run goes on with what is missing, as long as the sources of the program, the scripts that
-make cases and --seed are the same."""
+make cases and --seed are the same. With --record it does so on another machine, too."""
 
 import argparse
 import concurrent.futures
 import multiprocessing
+import json
 import os
 import signal
 import time
@@ -19,6 +20,31 @@ import sets
 PARTS = ("alarms", "mitsuba")
 
 
+class Record:
+    """What became of every case that is done, in a file: first what was judged, then a line for each case. Without a file
+    it is what the folder has."""
+
+    KEYS = ("program", "cases", "seed")  # the same in one study
+
+    def __init__(self, path, about):
+        self.path, self.about, self.outcomes = path, about, {}
+        if path and os.path.exists(path):
+            with open(path) as file:
+                first, *rest = map(json.loads, file)
+            if any(first[key] != about[key] for key in self.KEYS):
+                raise SystemExit(f"{path} is of another study: {first}; this is {about}")
+            self.about, self.outcomes = first, {one["case"]: one for one in rest}
+
+    def write(self):
+        if self.path:
+            lines = [self.about, *(self.outcomes[case] for case in sorted(self.outcomes))]
+            diagnoses.write_whole(self.path, "".join(json.dumps(line) + "\n" for line in lines).encode())
+
+
+def case_name(index, number):
+    return f"{sets.SETS[index][1]} case-{number:03d}"
+
+
 def run(folder, index, n, number, seed, program, deadline):
     """Makes and diagnoses one case, unless the time is over."""
     out = os.path.join(folder, sets.SETS[index][1])
@@ -28,7 +54,7 @@ def run(folder, index, n, number, seed, program, deadline):
         generate.make(out, sets.SETS[index][3](n, number, seed))
     answer = diagnoses.diagnose(program, os.path.join(out, f"case-{number:03d}"), 0)
     said = "+".join(e["name"] for e in answer.get("effects", [])) or "nothing"
-    print(f"{sets.SETS[index][1]} case-{number:03d}: {answer['verdict']}, said {said}", flush=True)
+    print(f"{case_name(index, number)}: {answer['verdict']}, said {said}", flush=True)
 
 
 def begin_worker(stop):
@@ -38,15 +64,19 @@ def begin_worker(stop):
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def scored(folder, index, seed, program):
+def scored(folder, index, seed, program, record):
     """Score of the cases of a set that are done, and their number."""
     out, result, done = os.path.join(folder, sets.SETS[index][1]), score.Score(), 0
     for _, number in sets.cases(index, 10**6):
-        truth, case = generate.made(out, number, seed), os.path.join(out, f"case-{number:03d}")
-        answer = diagnoses.kept(program.key, case, 0) if truth else None
-        if answer:
-            done += 1
-            result.add(f"{sets.SETS[index][1]} case-{number:03d}", truth, answer, score.expected_gain(truth, out))
+        name = case_name(index, number)
+        if name not in record.outcomes:
+            truth, case = generate.made(out, number, seed), os.path.join(out, f"case-{number:03d}")
+            answer = diagnoses.kept(program.key, case, 0) if truth else None
+            if not answer:
+                continue
+            record.outcomes[name] = score.outcome(name, truth, answer, score.expected_gain(truth, out))
+        done += 1
+        result.add(record.outcomes[name])
     return result, done
 
 
@@ -112,6 +142,7 @@ def main():
     parser.add_argument("--jobs", type=int, default=2, help="cases at once")
     parser.add_argument("--count", type=int, default=10**6, help="only the first cases of each set")
     parser.add_argument("--minutes", type=float, default=1e6, help="begin no case after this time")
+    parser.add_argument("--record", help="file of what became of each case: it is read first, and written at the end")
     parser.add_argument("--page", help="write what is done as a page of the book, too")
     parser.add_argument("--strict", action="store_true", help="exit with 1 unless every case that is done is right")
     arguments = parser.parse_args()
@@ -120,18 +151,21 @@ def main():
         if name not in ours:
             parser.error(f"{name} is not a set of {arguments.part}; choose from {', '.join(ours)}")
     program, deadline = diagnoses.Program(arguments.matdb, arguments.key), time.time() + 60 * arguments.minutes
-    stop = multiprocessing.Event()
+    by = {"program": program.key, "commit": program.commit, "cases": generate.generator(), "seed": arguments.seed}
+    record, stop = Record(arguments.record, by), multiprocessing.Event()
     with concurrent.futures.ProcessPoolExecutor(arguments.jobs, initializer=begin_worker, initargs=(stop,)) as pool:
         running = [
             pool.submit(run, arguments.out, names.index(name), n, number, arguments.seed, program, deadline)
-            for name in arguments.sets or ours for n, number in sets.cases(names.index(name), arguments.count)]
+            for name in arguments.sets or ours for n, number in sets.cases(names.index(name), arguments.count)
+            if case_name(names.index(name), number) not in record.outcomes]
         try:
             for future in running:
                 future.result()
         except KeyboardInterrupt:
             print("stopped: waiting for the cases that run; the same command goes on with the others", flush=True)
             stop.set()
-    found = [scored(arguments.out, index, arguments.seed, program) for index in range(len(names))]
+    found = [scored(arguments.out, index, arguments.seed, program, record) for index in range(len(names))]
+    record.write()
     scores, done = ({name: f[i] for name, f in zip(names, found)} for i in (0, 1))
     everything = score.Score()
     for s in scores.values():

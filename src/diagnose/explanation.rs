@@ -58,6 +58,7 @@ impl<'a> Explanation<'a> {
         let claim = Claim {
             gain: loss,
             least: scorer.settings.least_gain_of(space.effects[index].parameters().len(), 1),
+            may_be_form: false,
             held_out: scorer.difference(held_out, &without.held_out),
             size: scorer.size(&without, space, &fit.at),
             share_of_size: SHARE_OF_LARGEST,

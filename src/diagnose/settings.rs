@@ -65,7 +65,7 @@ impl Default for Diagnosis {
             standard_errors: 1.5,
             least_size_db: 0.1,
             least_structure_db: 0.15,
-            family_error: 0.02,
+            family_error: 0.005,
             draws: 4999,
             controls: true,
         }

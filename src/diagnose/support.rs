@@ -24,6 +24,10 @@ const MOST_SHARED: f64 = 0.35;
 const SHARE_KEPT: f64 = 0.6;
 /// Gain of such an effect, in least gains.
 const FAR_BEYOND: f64 = 4.0;
+/// Change of the means, dB, below which an effect may stand for an error of the form of a law, and the least gains that it
+/// then needs.
+const SMALL_DB: f64 = 0.25;
+const LEAST_GAINS_OF_SMALL: f64 = 2.5;
 /// Standard errors of a held-out gain that leaves no doubt.
 pub(super) const NO_DOUBT: f64 = 4.0;
 
@@ -33,6 +37,8 @@ pub(super) struct Claim {
     pub gain: f64,
     /// Least gain that counts.
     pub least: f64,
+    /// Whether it may stand for an error of the form of a law.
+    pub may_be_form: bool,
     /// Gain in ln p of held-out patches and its standard error.
     pub held_out: [f64; 2],
     pub size: Size,
@@ -64,7 +70,9 @@ impl Claim {
             && gain >= FAR_BEYOND * least
             && held_out >= SHARE_KEPT * gain
             && held_out > se;
-        gain >= least.max(largest.least_gain(size.is_spread(), shots))
+        let is_small = self.may_be_form && !size.is_spread() && size.mean_db < SMALL_DB;
+        let least_gains = if is_small { LEAST_GAINS_OF_SMALL } else { 1.0 };
+        gain >= (least_gains * least).max(largest.least_gain(size.is_spread(), shots))
             && size.larger_db() >= least_size_db.max(self.share_of_size * largest.size_db)
             && (self.counts() > standard_errors * se || is_local)
     }
@@ -96,6 +104,7 @@ impl<'j, 'p, 'a> Judge<'j, 'p, 'a> {
         let mut claim = Claim {
             gain,
             least: settings.least_gain_of(numbers, trial.tried),
+            may_be_form: !trial.effect.about().has_one_form,
             held_out: [f64::INFINITY, 0.0],
             size: trial.size,
             share_of_size: if is_spread { SHARE_OF_SPREAD } else { SHARE_OF_LARGEST },
@@ -145,5 +154,29 @@ impl<'j, 'p, 'a> Judge<'j, 'p, 'a> {
         let placebo_gain = self.placebo_gain(trial.candidate.numbers);
         trial.candidate.placebo_gain = Some(placebo_gain);
         trial.candidate.gain > placebo_gain
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_change_as_small_as_an_error_of_a_laws_form_must_gain_far_more_than_chance() {
+        let settings = Diagnosis::default();
+        let claim = |gain, mean_db, may_be_form| Claim {
+            gain,
+            least: 10.0,
+            may_be_form,
+            held_out: [gain, 4.0],
+            size: Size { mean_db, spread_db: 0.0 },
+            share_of_size: SHARE_OF_LARGEST,
+            largest: Largest::default(),
+        };
+        let is_supported = |claim: Claim| claim.is_supported(&settings, 4_000.0);
+        assert!(!is_supported(claim(18.0, 0.2, true)));
+        assert!(is_supported(claim(18.0, 0.3, true)));
+        assert!(is_supported(claim(26.0, 0.2, true)));
+        assert!(is_supported(claim(18.0, 0.2, false)), "a pose has no other form");
     }
 }
