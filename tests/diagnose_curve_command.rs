@@ -54,7 +54,8 @@ fn a_report_is_complete_and_its_table_gives_its_errors() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fs::write(at.join("coating.csv"), table("stray-light", &[0.01])).unwrap();
-    let command = ["--json", "diagnose", "--curve", "coating.csv", "-o", "out"];
+    let command =
+        ["--json", "diagnose", "--curve", "coating.csv", "--noise-db", "0.09", "-o", "out"];
     let output = matdb(at).args(command).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     assert_eq!(entries(&at.join("out")), FILES);
@@ -79,7 +80,9 @@ fn a_report_is_complete_and_its_table_gives_its_errors() {
     assert!(html.contains("stray-light") && html.contains("<svg") && !html.contains("http"));
 
     // Whoever blames the bench is told what to try before, and what was left out.
-    let some = ["diagnose", "--curve", "coating.csv", "--effects", "stray-light", "-o", "out"];
+    let mut some = command.to_vec();
+    some.retain(|word| *word != "--json");
+    some.extend(["--effects", "stray-light"]);
     let output = matdb(at).args(some).output().unwrap();
     let said = String::from_utf8(output.stdout).unwrap();
     assert!(
@@ -93,6 +96,13 @@ fn a_report_is_complete_and_its_table_gives_its_errors() {
     assert!(
         html.contains("Before stray-light is blamed") && html.contains("Left out of the search")
     );
+
+    // Where nobody knows the noise, nothing is called explained.
+    let output =
+        matdb(at).args(["diagnose", "--curve", "coating.csv", "-o", "out"]).output().unwrap();
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(said.contains("may be ") && said.contains("stray-light"), "{said}");
+    assert_eq!(json(&at.join("out/report.json"))["effects"], serde_json::json!([]));
 
     // What a diagnosis of a cloud left goes, and so does all of this when nothing can be said.
     for name in ["residual-map.png", "unknown-map.svg"] {
@@ -183,21 +193,19 @@ fn coatings(folder: &Path) -> BTreeMap<String, String> {
 
 /// A diagnosis as a line of the table in `docs/diagnosing-a-curve.md`.
 fn line(file: &str, report: &Value) -> String {
-    let errors = ["before", "after"].map(|model| number(&report["error"][model]["rmse_db"]));
+    let rmse_db = number(&report["error"]["before"]["rmse_db"]);
     let noise_db = number(&report["error"]["noise_floor_db"]);
-    let named = report["effects"].as_array().unwrap().iter().map(|found| {
-        let evidence = ["held_out_gain", "held_out_se"].map(|key| number(&found["evidence"][key]));
-        format!("`{}` ({:.0} ± {:.0})", found["name"].as_str().unwrap(), evidence[0], evidence[1])
-    });
+    let may_be = report["may_be"].as_array().unwrap().iter();
+    let may_be = may_be.map(|name| format!("`{}`", name.as_str().unwrap()));
     let unknown = report["unexplained"].as_array().unwrap().iter().map(|unknown| {
         let covariate = unknown["covariate"].as_str().unwrap();
         format!("{:.2} dB with {covariate}", number(&unknown["strength_db"]))
     });
     let listed = |all: Vec<String>| if all.is_empty() { "–".to_owned() } else { all.join(", ") };
-    let [named, unknown] = [named.collect(), unknown.collect()].map(listed);
+    let [may_be, unknown] = [may_be.collect(), unknown.collect()].map(listed);
     format!(
-        "| `{file}` | {} | {:.2} | {:.2} | {noise_db:.2} | {named} | {unknown} |",
-        report["curve"]["points"], errors[0], errors[1]
+        "| `{file}` | {} | {rmse_db:.2} | {noise_db:.2} | {may_be} | {unknown} |",
+        report["curve"]["points"]
     )
 }
 
@@ -218,28 +226,23 @@ fn structure_is_found_in_measured_coatings() {
     }
     /// What the provenance of the data says that one lobe and Lambert leave, dB, with room.
     const LEFT_DB: [f64; 2] = [0.4, 2.0];
-    let mut named = Vec::new();
-    println!("| curve | levels | before | after | noise | named | unknown |");
+    println!("| curve | levels | residual | noise | may be | unknown |");
     for file in entries(at) {
         matdb(at).args(["diagnose", "-q", "--curve", &file, "-o", "out"]).assert().success();
         let report = json(&at.join("out/report.json"));
-        let [before, after] =
-            ["before", "after"].map(|model| number(&report["error"][model]["rmse_db"]));
+        let before = number(&report["error"]["before"]["rmse_db"]);
         let noise_db = number(&report["error"]["noise_floor_db"]);
         println!("{}", line(&file, &report));
         assert_eq!(report["verdict"], "unexplained", "{file}");
         assert!((LEFT_DB[0]..LEFT_DB[1]).contains(&before), "{file}: {before}");
         assert!((0.05..0.3).contains(&noise_db) && before > 2.0 * noise_db, "{file}: {noise_db}");
-        assert!(after <= before, "{file}: {before} {after}");
         for unknown in report["unexplained"].as_array().unwrap() {
             assert!(number(&unknown["strength_db"]) > noise_db, "{file}: {unknown}");
         }
-        if report["effects"].as_array().is_some_and(|effects| !effects.is_empty()) {
-            named.push(format!("{file}: {} {before} {after}", report["effects"][0]["name"]));
-            assert!(after < 0.95 * before, "{named:?}");
-        }
+        // No law that was tried leaves no more than noise, so that nothing has a name: not even in the mounts of one
+        // sample that a film would improve.
+        assert_eq!(report["effects"], serde_json::json!([]), "{file}");
     }
-    assert!(!named.is_empty(), "nothing was named in any coating");
     for name in ["AnoBlackEC1onAlum", "AnoBlackEC2onAlum", "AnoBlackNiTEonSteel"] {
         let file = data.join(format!("{name}.bsdf"));
         let file = file.to_str().unwrap();

@@ -2,21 +2,26 @@
 //! none, or that the missing part is unknown.
 //!
 //! As for a scan, the scattering model is refitted first, so that "before" is the best model
-//! without a term. Every term is fitted with it and must predict runs of angles that took no part in
-//! its fit (`folds.rs`). A residual that then depends on an angle, smoothly and beyond chance, is unknown.
+//! without a term. Where it leaves no more than noise, nothing is missing. Else levels that lie far off by themselves are
+//! looked for, then other scattering models are tried, and only then terms. Every term is fitted with the model and must
+//! predict runs of angles that took no part in its fit (`folds.rs`). It gets a name only where no more than noise remains.
 //!
 //! | step | file |
 //! |---|---|
 //! | the curve as points, and their noise | `points.rs` |
 //! | terms that a scattering model can lack | `terms.rs` |
 //! | scattering model and terms together | `model.rs` |
-//! | held-out runs of angles, choice of terms | `folds.rs`, `select.rs` |
-//! | what remains | `smooth.rs`, `remains.rs` |
-//! | the report | `evidence.rs`, `report.rs`, `run.rs` |
+//! | other scattering models | `laws.rs` |
+//! | held-out runs of angles, choice of terms | `folds.rs`, `select.rs`, `trust.rs` |
+//! | what remains | `goodness.rs`, `smooth.rs`, `remains.rs` |
+//! | the answer and its report | `answer.rs`, `evidence.rs`, `report.rs`, `run.rs` |
 
+mod answer;
 mod error;
 mod evidence;
 mod folds;
+mod goodness;
+mod laws;
 mod model;
 mod points;
 mod remains;
@@ -30,14 +35,15 @@ mod terms;
 mod testing;
 #[cfg(test)]
 mod tests;
+mod trust;
 
 pub use error::CurveDiagnoseError;
 pub use evidence::{CurveEvidence, RankedTerm};
+pub use laws::base_law;
 pub use points::{Kind, Noise, NoiseSource, Point, Points};
 pub use report::{
-    CurveBase, CurveBaseValue, CurveBeforeAfter, CurveErrors, CurveFacts, CurveReport, CurveRow,
-    CurveUnknown, FoundTerm,
+    ComparedLaw, CurveBase, CurveBaseValue, CurveBeforeAfter, CurveErrors, CurveFacts, CurveReport,
+    CurveRow, CurveUnknown, CurveVerdict, FoundTerm,
 };
-pub use run::base_law;
 pub use settings::CurveDiagnosis;
 pub use terms::{Term, term, terms};

@@ -64,6 +64,8 @@ pub enum NoiseSource {
 pub struct Noise {
     /// Standard deviation of a level, dB; infinite where it is unknown.
     pub sd_db: f64,
+    /// Degrees of freedom that it was found with; infinite where it was stated.
+    pub freedom: f64,
     /// How it is known.
     pub source: NoiseSource,
 }
@@ -77,6 +79,8 @@ pub struct Points {
     pub points: Vec<Point>,
     /// The noise.
     pub noise: Noise,
+    /// Levels of each point in the order of the file, dB, where angles were repeated; else empty.
+    pub repeats: Vec<Vec<f64>>,
 }
 
 /// Least noise of a file, dB: files round.
@@ -122,7 +126,7 @@ impl Points {
                 .map(|angle_rad| (angle_rad.to_degrees() * 1e4).round() as i64);
             places.entry(place).or_default().push(value);
         }
-        let mut points: Vec<Point> = Vec::new();
+        let (mut points, mut levels) = (Vec::<Point>::new(), Vec::new());
         let mut scan = None;
         for (place, values) in &places {
             if let Some(point) = mean_point(values) {
@@ -133,9 +137,12 @@ impl Points {
                 };
                 scan = Some((place[0], number));
                 points.push(Point { scan: number, ..point });
+                levels.push(values.iter().map(|one| db_from_ratio(one.f_per_sr)).collect());
             }
         }
-        Points::new(Kind::InPlane, points, noise_db, repeats(&places).or_else(|| stated(values)))
+        let of_file = repeats(&places).or_else(|| stated(values));
+        let levels = if values.len() > places.len() { levels } else { Vec::new() };
+        Points { repeats: levels, ..Points::new(Kind::InPlane, points, noise_db, of_file) }
     }
 
     fn new(
@@ -145,16 +152,41 @@ impl Points {
         of_file: Option<Noise>,
     ) -> Points {
         let noise = match noise_db {
-            Some(sd_db) => Noise { sd_db, source: NoiseSource::Declared },
+            Some(sd_db) => Noise { sd_db, freedom: f64::INFINITY, source: NoiseSource::Declared },
             None => {
                 let known = of_file.unwrap_or_else(|| Noise {
                     sd_db: neighbours(&points).unwrap_or(f64::INFINITY),
+                    freedom: points.len() as f64,
                     source: NoiseSource::Neighbours,
                 });
                 Noise { sd_db: known.sd_db.max(LEAST_NOISE_DB), ..known }
             }
         };
-        Points { kind, points, noise }
+        Points { kind, points, noise, repeats: Vec::new() }
+    }
+
+    /// Whether the noise is known, and not taken from the curve's own bends.
+    pub fn has_known_noise(&self) -> bool {
+        self.noise.source != NoiseSource::Neighbours
+    }
+
+    /// One of the repeats, from 0, by itself. One level scatters more than the mean of several.
+    pub(super) fn repeat(&self, number: usize) -> Points {
+        let (mut points, mut counts) = (Vec::new(), 0.0);
+        for (point, levels) in self.points.iter().zip(&self.repeats) {
+            if let Some(&f_db) = levels.get(number) {
+                points.push(Point { f_db, ..*point });
+                counts += levels.len() as f64;
+            }
+        }
+        let more = (counts / points.len().max(1) as f64).sqrt();
+        let noise = Noise { sd_db: more * self.noise.sd_db, ..self.noise };
+        Points { kind: self.kind, points, noise, repeats: Vec::new() }
+    }
+
+    /// Measured less predicted levels, dB.
+    pub(super) fn residuals_db(&self, levels_db: &[f64]) -> Vec<f64> {
+        self.points.iter().zip(levels_db).map(|(point, db)| point.f_db - db).collect()
     }
 
     /// The angle that a scan runs over, rad.
@@ -206,6 +238,7 @@ fn repeats(places: &BTreeMap<[i64; 2], Vec<&InPlane>>) -> Option<Noise> {
     const LEAST_SPARE: f64 = 5.0;
     (spare >= LEAST_SPARE).then(|| Noise {
         sd_db: (squares / spare * inverse / places.len() as f64).sqrt(),
+        freedom: spare,
         source: NoiseSource::Repeats,
     })
 }
@@ -215,7 +248,7 @@ fn stated(values: &[InPlane]) -> Option<Noise> {
     let known: Option<Vec<f64>> = values.iter().map(|value| value.sd_db).collect();
     let known = known.filter(|known| !known.is_empty())?;
     let square = known.iter().map(|sd| sd * sd).sum::<f64>() / known.len() as f64;
-    Some(Noise { sd_db: square.sqrt(), source: NoiseSource::File })
+    Some(Noise { sd_db: square.sqrt(), freedom: f64::INFINITY, source: NoiseSource::File })
 }
 
 /// Scatter about the line through the neighbours, dB; `None` where no scan has three angles.

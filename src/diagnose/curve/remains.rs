@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::folds::autocorrelation;
+use super::goodness::{least_size_db, scattered, unknown};
 use super::model::{Fit, Score};
 use super::points::Points;
 use super::report::{CurveBaseValue, CurveErrors, CurveUnknown, FoundTerm};
@@ -11,8 +12,6 @@ use super::smooth::{Covariate, Smooth, covariates};
 use crate::diagnose::report::Value;
 use crate::fit::normal_share;
 
-/// Name of structure of unknown origin.
-const UNKNOWN: &str = "unknown";
 /// Lags over which the correlation of residuals is summed.
 const LAGS: usize = 20;
 /// Correlation below which the sum ends.
@@ -20,7 +19,7 @@ const LEAST_CORRELATION: f64 = 0.1;
 
 /// Residuals less smooth curves over every angle, dB: what neighbours share without a smooth reason.
 pub(super) fn without_smooth(points: &Points, levels_db: &[f64], scale_db: f64) -> Vec<f64> {
-    let mut left_db = residuals_db(points, levels_db);
+    let mut left_db = points.residuals_db(levels_db);
     for covariate in covariates(points.kind) {
         let smooth = fit(points, covariate, &left_db, scale_db, |_| true);
         for (left, point) in left_db.iter_mut().zip(&points.points) {
@@ -57,6 +56,8 @@ pub(super) fn unexplained(selection: &Selection, state: &State) -> Vec<CurveUnkn
         covariates.filter_map(|covariate| over(selection, state, covariate)).collect();
     found.sort_by(|a, b| b.held_out_gain.unwrap_or(0.0).total_cmp(&a.held_out_gain.unwrap_or(0.0)));
     found.extend(correlated(selection, state));
+    let all = vec![true; selection.points.points.len()];
+    found.extend(scattered(selection, &state.model, &state.fitted, &all));
     found
 }
 
@@ -73,15 +74,12 @@ fn over(selection: &Selection, state: &State, covariate: &Covariate) -> Option<C
     let strength_db = (squares / points.points.len().max(1) as f64).sqrt();
     let is_found = gain > settings.standard_errors * se
         && gain > settings.least_gain / 2.0
-        && strength_db >= settings.least_size_db;
+        && strength_db >= least_size_db(selection);
     is_found.then(|| CurveUnknown {
-        name: UNKNOWN,
-        covariate: covariate.name,
-        strength_db,
         held_out_gain: Some(gain),
         held_out_se: Some(se),
         held_out_rmse_db: Some(CurveErrors::of(points, &after).rmse_db),
-        p_value: normal_share(-gain / se.max(f64::MIN_POSITIVE)),
+        ..unknown(covariate.name, strength_db, normal_share(-gain / se.max(f64::MIN_POSITIVE)))
     })
 }
 
@@ -91,7 +89,7 @@ fn held_out_with_smooth(selection: &Selection, state: &State, covariate: &Covari
     let mut after = state.held_out.clone();
     for (fold, fitted) in state.of_fold.iter().enumerate() {
         let levels_db = state.model.levels_db(&fitted.at, &points.points);
-        let residual_db = residuals_db(points, &levels_db);
+        let residual_db = points.residuals_db(&levels_db);
         let used = |index: usize| folds.fold.get(index) != Some(&fold);
         let smooth = fit(points, covariate, &residual_db, fitted.scale_db, used);
         let bend_db: Vec<f64> =
@@ -121,26 +119,13 @@ fn correlated(selection: &Selection, state: &State) -> Option<CurveUnknown> {
     let shared = autocorrelation(points, &residual_db, 1);
     let p_value = normal_share(-shared * (squares.len() as f64).sqrt());
     let strength_db = (shared.max(0.0) * square).sqrt();
-    let is_found = p_value <= settings.family_error && strength_db >= settings.least_size_db;
-    is_found.then_some(CurveUnknown {
-        name: UNKNOWN,
-        covariate: "neighbouring angles",
-        strength_db,
-        held_out_gain: None,
-        held_out_se: None,
-        held_out_rmse_db: None,
-        p_value,
-    })
+    let is_found = p_value <= settings.family_error && strength_db >= least_size_db(selection);
+    is_found.then(|| unknown("neighbouring angles", strength_db, p_value))
 }
 
 /// Measured less predicted levels under a fit, dB.
 fn residuals_of(points: &Points, state: &State, fit: &Fit) -> Vec<f64> {
-    residuals_db(points, &state.model.levels_db(&fit.at, &points.points))
-}
-
-/// Measured less predicted levels, dB.
-fn residuals_db(points: &Points, levels_db: &[f64]) -> Vec<f64> {
-    points.points.iter().zip(levels_db).map(|(point, db)| point.f_db - db).collect()
+    points.residuals_db(&state.model.levels_db(&fit.at, &points.points))
 }
 
 /// The terms and the scattering model with the parameters of the last fit and their standard deviations.

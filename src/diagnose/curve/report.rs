@@ -7,8 +7,24 @@ use serde::Serialize;
 use super::evidence::{CurveEvidence, RankedTerm};
 use super::model::Score;
 use super::points::{Kind, NoiseSource, Points};
-use crate::diagnose::report::{Value, Verdict};
+use crate::diagnose::report::Value;
 use crate::effects::Level;
+
+/// The answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum CurveVerdict {
+    /// The scattering model explains the curve.
+    NoMissingEffect,
+    /// Another scattering model than the declared one explains the curve.
+    AnotherLaw,
+    /// The scattering model with the added terms explains the curve.
+    Explained,
+    /// Structure remains that neither other models nor terms explain.
+    Unexplained,
+    /// No structure remains, and how much noise alone would leave is unknown.
+    NoiseUnknown,
+}
 
 /// A term that was added.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -30,8 +46,12 @@ pub struct FoundTerm {
 pub struct CurveUnknown {
     /// Always `unknown`.
     pub name: &'static str,
-    /// The angle that it depends on, or `neighbouring angles`.
+    /// The angle that it depends on, `neighbouring angles`, `isolated angles`, or `scatter` for more of it than the noise
+    /// has.
     pub covariate: &'static str,
+    /// Pairs of incidence and receiver angle, degrees, at which isolated levels lie; else empty.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub at_deg: Vec<[f64; 2]>,
     /// Its size: root mean square over the levels, dB.
     pub strength_db: f64,
     /// Gain in ln p of held-out angles by a smooth curve; none where there is no curve.
@@ -104,9 +124,26 @@ pub struct CurveBaseValue {
     pub value: Value,
 }
 
+/// A scattering model that the curve was compared with.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ComparedLaw {
+    /// Its name; `declared` of the one that was asked for.
+    pub name: &'static str,
+    /// Root mean square residual of the detections, dB.
+    pub rms_db: f64,
+    /// Its free parameters.
+    pub numbers: usize,
+    /// Probability by chance that the residual exceeds the noise as much; none where the noise is unknown.
+    pub p_value: Option<f64>,
+    /// Whether no test of what remains finds anything.
+    pub explains: bool,
+}
+
 /// The scattering model that the terms are added to.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CurveBase {
+    /// Its name; `declared` of the one that was asked for.
+    pub law: &'static str,
     /// Its parameters, as fitted with the terms.
     pub parameters: Vec<CurveBaseValue>,
     /// Whether the final fit converged.
@@ -155,11 +192,15 @@ pub struct CurveReport {
     /// Version of the schema.
     pub schema: u32,
     /// The answer.
-    pub verdict: Verdict,
+    pub verdict: CurveVerdict,
     /// Terms in the order in which they were added.
     pub effects: Vec<FoundTerm>,
     /// Every term of every round.
     pub ranking: Vec<RankedTerm>,
+    /// Terms that improve the law and are not enough, or whose law of noise is unknown: they may stand for something else.
+    pub may_be: Vec<&'static str>,
+    /// The scattering models that the curve was compared with: the others only where the first does not explain it.
+    pub laws: Vec<ComparedLaw>,
     /// Structure that no term explains.
     pub unexplained: Vec<CurveUnknown>,
     /// Errors on held-out angles.

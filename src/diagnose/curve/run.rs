@@ -1,28 +1,24 @@
 //! The steps of the diagnosis of a curve.
 
+use rayon::prelude::*;
+
+use super::answer::{Answer, Compared, DECLARED};
 use super::error::CurveDiagnoseError;
-use super::evidence::RankedTerm;
 use super::folds::Folds;
+use super::laws::other_laws;
 use super::model::{Model, Score};
 use super::points::{Points, f_per_sr};
 use super::remains;
 use super::report::{
-    CurveBase, CurveBeforeAfter, CurveErrors, CurveFacts, CurveReport, CurveRow, CurveUnknown,
+    CurveBase, CurveBeforeAfter, CurveErrors, CurveFacts, CurveReport, CurveRow, CurveVerdict,
 };
-use super::select::{Addition, Selection, State};
+use super::select::Selection;
 use super::settings::{CurveDiagnosis, LEAST_BLOCKS, LEAST_POINTS};
 use super::terms::Term;
-use crate::brdf::{Brdf, CookTorrance, Distribution, Lambert, Shadowing, Sum};
-use crate::diagnose::report::{SCHEMA, Verdict};
+use crate::brdf::Brdf;
+use crate::diagnose::report::SCHEMA;
 use crate::diagnose::score::AT_THE_FLOOR;
 use crate::fit::bistatic::{Bistatic, Sample};
-
-/// The default scattering model: one GGX lobe over Lambert, with values to start from.
-pub fn base_law() -> Brdf {
-    let (distribution, shadowing) = (Distribution::Ggx, Shadowing::Separable);
-    let lobe = CookTorrance { f_lambda: 0.05, m: 0.3, m_across: None, distribution, shadowing };
-    Brdf::Sum(Sum { parts: vec![Brdf::Lambert(Lambert { albedo: 0.1 }), Brdf::CookTorrance(lobe)] })
-}
 
 impl CurveDiagnosis {
     /// Diagnoses a curve against a scattering model, trying these terms.
@@ -58,9 +54,17 @@ impl CurveDiagnosis {
         }
         let selection = Selection { points, folds: &folds, settings: self };
         let before = selection.state(model, fitted);
-        let (after, ranking, added) = selection.run(before.clone(), terms);
-        let unexplained = remains::unexplained(&selection, &after);
-        Ok(self.report(&selection, [&before, &after], ranking, added, unexplained))
+        let mut compared = vec![Compared::new(&selection, DECLARED, before)];
+        if !compared[0].explains() {
+            let others = other_laws().into_par_iter().filter_map(|(name, law)| {
+                let model = Model::new(&self.first_fit(points, &law).ok()?).ok()?;
+                let fitted = model.fit(points, &all, &model.start());
+                Some(Compared::new(&selection, name, selection.state(model, fitted)))
+            });
+            compared.extend(others.collect::<Vec<Compared>>());
+        }
+        let answer = Answer::of(&selection, &compared, terms);
+        Ok(self.report(&selection, &compared, answer))
     }
 
     /// The scattering model by least squares in dB of all detections, from several starts.
@@ -74,26 +78,33 @@ impl CurveDiagnosis {
         Ok(Bistatic { seed: self.seed, ..Bistatic::default() }.run(law, &samples)?.model)
     }
 
-    fn report(
-        &self,
-        selection: &Selection,
-        [before, after]: [&State; 2],
-        ranking: Vec<RankedTerm>,
-        added: Vec<Addition>,
-        unexplained: Vec<CurveUnknown>,
-    ) -> CurveReport {
+    fn report(&self, selection: &Selection, compared: &[Compared], answer: Answer) -> CurveReport {
         let Selection { points, folds, .. } = *selection;
-        let (effects, parameters) = remains::values(selection, after, added);
-        let verdict = Verdict::new(!effects.is_empty(), !unexplained.is_empty());
+        let Answer { law, after, ranking, added, may_be, unexplained } = answer;
+        let (effects, parameters) = remains::values(selection, &after, added);
+        let verdict = if !unexplained.is_empty() {
+            CurveVerdict::Unexplained
+        } else if !points.has_known_noise() {
+            CurveVerdict::NoiseUnknown
+        } else if !effects.is_empty() {
+            CurveVerdict::Explained
+        } else if law != DECLARED {
+            CurveVerdict::AnotherLaw
+        } else {
+            CurveVerdict::NoMissingEffect
+        };
+        let before = compared.first().map_or(&after, |declared| &declared.state);
         let scans = points.points.last().map_or(0, |point| point.scan + 1);
         CurveReport {
             schema: SCHEMA,
             verdict,
             effects,
             ranking,
+            may_be,
+            laws: compared.iter().map(|one| one.in_report(points)).collect(),
             unexplained,
             error: before_after(points, folds, [&before.held_out, &after.held_out]),
-            base: CurveBase { parameters, converged: after.fitted.converged },
+            base: CurveBase { law, parameters, converged: after.fitted.converged },
             curve: CurveFacts {
                 kind: points.kind,
                 points: points.points.len(),

@@ -241,7 +241,7 @@ impl Term for Subsurface {
     }
 }
 
-struct ThinFilm;
+pub(super) struct ThinFilm;
 
 /// Index of refraction of a film: paints and oxides have 1.4 to 1.8, and the ripple hardly depends on it.
 const FILM_INDEX: f64 = 1.5;
@@ -264,10 +264,18 @@ impl Term for ThinFilm {
     }
 
     fn scatter(&self, values: &[f64], law: &Brdf, point: &Point, f_per_sr: f64) -> f64 {
-        let &[visibility, thickness] = values else { return f_per_sr };
-        let [i, o] = [point.i, point.o].map(cos_inside);
-        let phase_rad = TAU * thickness * (i + o);
+        let &[visibility, _] = values else { return f_per_sr };
+        let phase_rad = ThinFilm::phase_rad(values, point);
         f_per_sr + lobes_per_sr(law, point, &|_| visibility * phase_rad.cos())
+    }
+}
+
+impl ThinFilm {
+    /// Phase between the two waves that a film of these numbers returns at a point, rad.
+    pub fn phase_rad(values: &[f64], point: &Point) -> f64 {
+        let thickness = values.get(1).copied().unwrap_or(0.0);
+        let [i, o] = [point.i, point.o].map(cos_inside);
+        TAU * thickness * (i + o)
     }
 }
 

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::answer::CurveAnswer;
-use super::text::{advice, angle, noise_source, sentence};
+use super::text::{advice, angle, heading, may_be, noise_source, places, sentence, verdict};
 use crate::diagnose::curve::{CurveEvidence, CurveReport, CurveUnknown};
 use crate::error::Error;
 use crate::formats::words::capitalised;
@@ -11,7 +11,7 @@ use crate::report::choice::{Omission, left_out};
 use crate::report::effect::{Article, of_curve};
 use crate::report::picture::{Figure, Picture};
 use crate::report::templates;
-use crate::report::words::{gone, heading, value, verdict};
+use crate::report::words::{gone, value};
 
 /// What the template takes.
 #[derive(Serialize)]
@@ -33,12 +33,13 @@ struct Page<'a> {
     /// Numbers of the base law: name and value.
     law: Vec<[String; 2]>,
     advice: Option<String>,
+    may_be: Option<String>,
 }
 
 /// Structure that remains, and the angle that it depends on.
 #[derive(Serialize)]
 struct Remaining<'a> {
-    angle: &'a str,
+    angle: String,
     unknown: &'a CurveUnknown,
 }
 
@@ -47,7 +48,9 @@ pub(super) fn page(answer: CurveAnswer, picture: &Picture) -> Result<Vec<u8>, Er
     let CurveAnswer { report, name, model, seed, not_tried, .. } = answer;
     let mut unexplained = Vec::new();
     for unknown in &report.unexplained {
-        unexplained.push(Remaining { angle: angle(unknown.covariate), unknown });
+        let at = if unknown.at_deg.is_empty() { "" } else { ": " };
+        let angle = format!("{}{at}{}", angle(unknown.covariate), places(unknown));
+        unexplained.push(Remaining { angle, unknown });
     }
     let mut law = Vec::new();
     for number in &report.base.parameters {
@@ -59,7 +62,7 @@ pub(super) fn page(answer: CurveAnswer, picture: &Picture) -> Result<Vec<u8>, Er
         name,
         model,
         seed,
-        heading: heading(report.verdict, report.effects.len()),
+        heading: heading(report),
         sentence: capitalised(&sentence(report)) + ".",
         effects: report.effects.iter().map(of_curve).collect(),
         noise_source: noise_source(report.error.noise_source),
@@ -68,6 +71,7 @@ pub(super) fn page(answer: CurveAnswer, picture: &Picture) -> Result<Vec<u8>, Er
         unexplained,
         not_tried: left_out(not_tried),
         law,
+        may_be: may_be(report).map(|one| capitalised(&one) + "."),
         advice: advice(answer).map(|advice| capitalised(&advice) + "."),
     };
     templates::page("curve.html", &context)

@@ -3,33 +3,80 @@
 use std::path::Path;
 
 use super::answer::CurveAnswer;
-use crate::diagnose::Verdict;
-use crate::diagnose::curve::{CurveReport, CurveUnknown, FoundTerm, NoiseSource};
+use crate::diagnose::curve::{CurveReport, CurveUnknown, CurveVerdict, FoundTerm, NoiseSource};
 use crate::effects::Level;
 use crate::formats::words::{listed, plus_minus};
-use crate::report::words::{gone, others, value, verdict};
+use crate::report::words::{gone, others, value};
+
+/// The verdict in a word or two.
+pub(super) fn verdict(verdict: CurveVerdict) -> &'static str {
+    match verdict {
+        CurveVerdict::NoMissingEffect => "nothing is missing",
+        CurveVerdict::AnotherLaw => "another law",
+        CurveVerdict::Explained => "explained",
+        CurveVerdict::Unexplained => "unexplained",
+        CurveVerdict::NoiseUnknown => "the noise is not known",
+    }
+}
+
+/// The verdict as a heading.
+pub(super) fn heading(report: &CurveReport) -> &'static str {
+    match (report.verdict, report.effects.len()) {
+        (CurveVerdict::NoMissingEffect, _) => "Nothing is missing",
+        (CurveVerdict::AnotherLaw, _) => "Another law explains the curve",
+        (CurveVerdict::Explained, 2..) => "The missing effects are found",
+        (CurveVerdict::Explained, _) => "The missing effect is found",
+        (CurveVerdict::Unexplained, _) => "Something unknown remains",
+        (CurveVerdict::NoiseUnknown, _) => "The noise is not known",
+    }
+}
 
 /// The verdict in a sentence.
 pub(super) fn sentence(report: &CurveReport) -> String {
     let names: Vec<&str> = report.effects.iter().map(|found| found.name).collect();
     let names = listed(&names);
-    match (report.verdict, report.effects.is_empty()) {
-        (Verdict::NoMissingEffect, _) => {
-            "the law explains the curve, and nothing that is tested for remains".to_owned()
+    match report.verdict {
+        CurveVerdict::NoMissingEffect => {
+            "the law explains the curve within its noise, and no structure remains".to_owned()
         }
-        (Verdict::Explained, _) => {
-            format!("the law lacks {names}; with that, what is left is noise")
-        }
-        (Verdict::Unexplained | Verdict::Contradictory, false) => format!(
-            "the law lacks {names}, which the curve supports, and something unknown remains that no \
-             effect that was tried explains"
+        CurveVerdict::AnotherLaw => format!(
+            "another law, {}, explains the curve within its noise, and needs no effect",
+            report.base.law
         ),
-        (Verdict::Unexplained | Verdict::Contradictory, true) => {
-            "the law does not explain the curve, and no effect that was tried does: what remains is \
-             unknown"
+        CurveVerdict::Explained => {
+            let law = if report.base.law == "declared" { "the law" } else { report.base.law };
+            format!("{law} lacks {names}; with that, what is left is noise")
+        }
+        CurveVerdict::Unexplained if report.laws.len() > 1 => {
+            "the law does not explain the curve, and neither another law nor an effect that was tried \
+             does: what remains is unknown"
                 .to_owned()
         }
+        CurveVerdict::Unexplained => {
+            "the law does not explain the curve: what remains is unknown".to_owned()
+        }
+        CurveVerdict::NoiseUnknown => {
+            let law = match report.base.law {
+                "declared" => "the law".to_owned(),
+                other => format!("another law, {other},"),
+            };
+            format!(
+                "{law} leaves no structure, but nobody knows how much noise alone would leave, so that \
+                 nothing can be called explained; repeat some angles, or state --noise-db"
+            )
+        }
     }
+}
+
+/// What improves the law and gets no name; `None` where nothing does.
+pub(super) fn may_be(report: &CurveReport) -> Option<String> {
+    (!report.may_be.is_empty()).then(|| {
+        format!(
+            "may be {}: the law improves with that, but not to its noise, or not in every repeat, or with a \
+             number at its bound; a law of another shape would do the same",
+            listed(&report.may_be)
+        )
+    })
 }
 
 /// How the noise is known.
@@ -49,6 +96,7 @@ pub(super) fn angle(covariate: &str) -> &str {
         "theta_s" => "angle of the receiver",
         "theta_s - theta_i" => "angle from the mirror direction",
         "theta_s + theta_i" => "angle from backscatter",
+        "scatter" => "more scatter than the noise has",
         other => other,
     }
 }
@@ -79,6 +127,9 @@ pub(super) fn text(answer: CurveAnswer, folder: &Path) -> String {
     }
     if let Some(advice) = advice(answer) {
         text += &format!("  {advice}\n");
+    }
+    if let Some(may_be) = may_be(report) {
+        text += &format!("  {may_be}\n");
     }
     text += &error(report);
     if report.unexplained.is_empty() {
@@ -138,5 +189,21 @@ fn remains(unknown: &CurveUnknown) -> String {
         ),
         _ => String::new(),
     };
-    format!("  unknown: {:.2} dB with {}{gain}\n", unknown.strength_db, angle(unknown.covariate))
+    let (db, what) = (unknown.strength_db, angle(unknown.covariate));
+    match unknown.covariate {
+        "scatter" => format!("  unknown: {db:.2} dB more scatter than the noise has\n"),
+        "isolated angles" => {
+            format!("  unknown: {db:.2} dB at single angles: {}\n", places(unknown))
+        }
+        _ => format!("  unknown: {db:.2} dB with {what}{gain}\n"),
+    }
+}
+
+/// Angles of isolated levels.
+pub(super) fn places(unknown: &CurveUnknown) -> String {
+    let places = unknown
+        .at_deg
+        .iter()
+        .map(|[i, s]| if *s == -*i { format!("{i:.1}°") } else { format!("{i:.1}°/{s:.1}°") });
+    places.collect::<Vec<String>>().join(", ")
 }

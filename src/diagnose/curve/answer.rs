@@ -1,0 +1,141 @@
+//! What a curve lacks: nothing, another scattering model, terms, or something unknown.
+
+use super::evidence::RankedTerm;
+use super::goodness::{goodness, isolated};
+use super::points::Points;
+use super::remains;
+use super::report::{ComparedLaw, CurveUnknown};
+use super::select::{Addition, Selection, State};
+use super::terms::Term;
+use super::trust::are_trusted;
+
+/// Name of the model that was asked for.
+pub(super) const DECLARED: &str = "declared";
+/// Other models to which terms are added, the likeliest first.
+const MOST_OTHERS: usize = 1;
+
+/// A scattering model that was fitted to the curve, and what it leaves.
+pub(super) struct Compared {
+    pub name: &'static str,
+    pub state: State,
+    left: Vec<CurveUnknown>,
+}
+
+impl Compared {
+    pub fn new(selection: &Selection, name: &'static str, state: State) -> Compared {
+        let left = remains::unexplained(selection, &state);
+        Compared { name, state, left }
+    }
+
+    /// Whether no test of what remains finds anything.
+    pub fn explains(&self) -> bool {
+        self.left.is_empty()
+    }
+
+    pub fn in_report(&self, points: &Points) -> ComparedLaw {
+        let State { model, fitted, .. } = &self.state;
+        let all = vec![true; points.points.len()];
+        let residual_db = points.residuals_db(&model.levels_db(&fitted.at, &points.points));
+        let seen = points.points.iter().zip(residual_db).filter(|(point, _)| !point.censored);
+        let squares: Vec<f64> = seen.map(|(_, residual)| residual * residual).collect();
+        ComparedLaw {
+            name: self.name,
+            rms_db: (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt(),
+            numbers: model.unknowns(),
+            p_value: goodness(points, model, fitted, &all),
+            explains: self.explains(),
+        }
+    }
+}
+
+/// Schwarz's criterion, halved (Ann. Stat. 6 (1978) 461): of models that explain a curve the one with the least is the best.
+fn criterion(selection: &Selection, state: &State) -> f64 {
+    let count = selection.points.points.len() as f64;
+    0.5 * state.model.unknowns() as f64 * count.ln() - state.fitted.log_p
+}
+
+/// The answer.
+pub(super) struct Answer {
+    /// Name of the scattering model.
+    pub law: &'static str,
+    /// That model with the terms.
+    pub after: State,
+    pub ranking: Vec<RankedTerm>,
+    pub added: Vec<Addition>,
+    pub may_be: Vec<&'static str>,
+    pub unexplained: Vec<CurveUnknown>,
+}
+
+impl Answer {
+    /// The first of these that leaves no more than noise: the declared model, one of the others, one of them with terms. Where
+    /// a model explains all but a few isolated levels, terms are not tried.
+    pub fn of(selection: &Selection, compared: &[Compared], terms: &[&'static dyn Term]) -> Answer {
+        let (declared, others) = compared.split_at(1);
+        let declared = &declared[0];
+        if declared.explains() {
+            return Answer::without_terms(declared, Vec::new());
+        }
+        let mut others: Vec<&Compared> = others.iter().collect();
+        others.sort_by(|a, b| {
+            let [a, b] = [a, b].map(|one| criterion(selection, &one.state));
+            a.total_cmp(&b)
+        });
+        if let Some(best) = others.iter().find(|one| one.explains()) {
+            return Answer::without_terms(best, Vec::new());
+        }
+        for one in compared {
+            let State { model, fitted, .. } = &one.state;
+            if let Some(isolated) = isolated(selection, model, fitted) {
+                return Answer::without_terms(one, vec![isolated]);
+            }
+        }
+        let bases = [declared].into_iter().chain(others.into_iter().take(MOST_OTHERS));
+        let mut found: Vec<Answer> =
+            bases.map(|one| Answer::with_terms(selection, one, terms)).collect();
+        found.sort_by(|a, b| {
+            let [a, b] = [a, b].map(|one| criterion(selection, &one.after));
+            a.total_cmp(&b)
+        });
+        let explaining = found.iter().position(|one| one.unexplained.is_empty());
+        if let Some(best) = explaining {
+            return found.swap_remove(best);
+        }
+        // What improves a model and leaves more than noise may stand for something else.
+        let mut ranking = Vec::new();
+        let mut may_be = Vec::new();
+        for one in found {
+            may_be.extend(one.added.iter().map(|added| added.term.name()));
+            may_be.extend(one.may_be);
+            ranking.extend(one.ranking);
+        }
+        may_be.sort_unstable();
+        may_be.dedup();
+        let without = Answer::without_terms(declared, declared.left.clone());
+        Answer { ranking, may_be, ..without }
+    }
+
+    fn without_terms(one: &Compared, unexplained: Vec<CurveUnknown>) -> Answer {
+        Answer {
+            law: one.name,
+            after: one.state.clone(),
+            ranking: Vec::new(),
+            added: Vec::new(),
+            may_be: Vec::new(),
+            unexplained,
+        }
+    }
+
+    /// A model with the terms that it supports. They get no name where one of them cannot be trusted, or where nobody knows
+    /// what noise alone would leave.
+    fn with_terms(selection: &Selection, one: &Compared, terms: &[&'static dyn Term]) -> Answer {
+        let (after, ranking, added) = selection.run(one.state.clone(), terms);
+        let is_trusted = selection.points.has_known_noise()
+            && are_trusted(selection.points, &one.state, &after, &added);
+        if !is_trusted {
+            let may_be = added.iter().map(|added| added.term.name()).collect();
+            return Answer { ranking, may_be, ..Answer::without_terms(one, one.left.clone()) };
+        }
+        let unexplained = remains::unexplained(selection, &after);
+        Answer { law: one.name, after, ranking, added, may_be: Vec::new(), unexplained }
+    }
+}

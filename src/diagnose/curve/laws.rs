@@ -1,0 +1,38 @@
+//! Other scattering models, with which a curve is compared before any term: a lobe of another shape must not come out as
+//! an effect.
+
+use crate::brdf::{Brdf, CookTorrance, Distribution, Lambert, Shadowing, Sum};
+use crate::fit::model;
+
+/// Models by name, with values from which a search starts.
+const BY_NAME: [&str; 4] = ["mixture", "mixture-ggx", "kirchhoff-go", "directive"];
+/// Two lobes over Lambert.
+const TWO_LOBES: [(&str, [Distribution; 2]); 3] = [
+    ("two GGX lobes over Lambert", [Distribution::Ggx, Distribution::Ggx]),
+    ("a Beckmann and a GGX lobe over Lambert", [Distribution::Beckmann, Distribution::Ggx]),
+    ("two Beckmann lobes over Lambert", [Distribution::Beckmann, Distribution::Beckmann]),
+];
+
+/// Every other model with its name.
+pub(super) fn other_laws() -> Vec<(&'static str, Brdf)> {
+    let named = BY_NAME.into_iter().filter_map(|name| Some((name, model(name)?)));
+    let two = TWO_LOBES.into_iter().map(|(name, [narrow, wide])| {
+        let parts = vec![flat(), lobe(narrow, 0.08), lobe(wide, 0.4)];
+        (name, Brdf::Sum(Sum { parts }))
+    });
+    named.chain(two).collect()
+}
+
+/// The default scattering model: one GGX lobe over Lambert, with values to start from.
+pub fn base_law() -> Brdf {
+    Brdf::Sum(Sum { parts: vec![flat(), lobe(Distribution::Ggx, 0.3)] })
+}
+
+fn flat() -> Brdf {
+    Brdf::Lambert(Lambert { albedo: 0.1 })
+}
+
+fn lobe(distribution: Distribution, m: f64) -> Brdf {
+    let shadowing = Shadowing::Separable;
+    Brdf::CookTorrance(CookTorrance { f_lambda: 0.05, m, m_across: None, distribution, shadowing })
+}

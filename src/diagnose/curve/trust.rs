@@ -1,0 +1,88 @@
+//! Whether terms that improve a model may be called by their names.
+
+use std::f64::consts::TAU;
+
+use super::points::Points;
+use super::select::{Addition, State};
+use super::terms::{Term, ThinFilm};
+
+/// Fringes that a film shows over the angles of the curve.
+const LEAST_FRINGES: f64 = 1.0;
+/// Levels that a repeat needs to count.
+const LEAST_LEVELS: usize = 12;
+/// Share of the mean gain of all repeats that each must have.
+const SHARE_IN_EACH: f64 = 0.25;
+/// A number nearer to a bound than this share of its range is at the bound.
+const AT_BOUND: f64 = 1e-3;
+
+/// Whether no number of a term is at a bound, a film shows a whole fringe, and the terms together hold in every repeat.
+pub(super) fn are_trusted(
+    points: &Points,
+    before: &State,
+    after: &State,
+    added: &[Addition],
+) -> bool {
+    let (_, values) = after.model.numbers(&after.fitted.at);
+    let is_trusted = |(one, values): (&Addition, &Vec<f64>)| {
+        is_inside(one.term, values)
+            && (one.term.name() != ThinFilm.name() || fringes(points, values) >= LEAST_FRINGES)
+    };
+    added.iter().zip(&values).all(is_trusted) && holds_in_repeats(points, before, after)
+}
+
+/// Whether no number of a term is at a bound.
+fn is_inside(term: &dyn Term, values: &[f64]) -> bool {
+    term.parameters().iter().zip(values).all(|(known, value)| {
+        let margin = AT_BOUND * (known.max - known.min);
+        let is_absent_end = |bound: f64| bound == known.absent;
+        (value - known.min > margin || is_absent_end(known.min))
+            && (known.max - value > margin || is_absent_end(known.max))
+    })
+}
+
+/// Fringes of a film from the least to the largest path through it among the detected levels.
+fn fringes(points: &Points, values: &[f64]) -> f64 {
+    let seen = points.points.iter().filter(|point| !point.censored);
+    let phases = seen.map(|point| ThinFilm::phase_rad(values, point));
+    let (least, most) = phases.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), phase| {
+        (least.min(phase), most.max(phase))
+    });
+    (most - least) / TAU
+}
+
+/// Whether the terms gain in every repeat of the curve, fitted to it alone.
+fn holds_in_repeats(points: &Points, before: &State, after: &State) -> bool {
+    let most = points.repeats.iter().map(Vec::len).max().unwrap_or(0);
+    let share = (after.fitted.log_p - before.fitted.log_p) / most.max(1) as f64;
+    (0..most).all(|number| {
+        let repeat = points.repeat(number);
+        let all = vec![true; repeat.points.len()];
+        let [without, with] =
+            [before, after].map(|state| state.model.fit(&repeat, &all, &state.fitted.at).log_p);
+        repeat.points.len() < LEAST_LEVELS || with - without >= SHARE_IN_EACH * share
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::curve::base_law;
+    use crate::diagnose::curve::testing::in_plane;
+
+    #[test]
+    fn a_film_of_a_fifth_of_a_wavelength_shows_less_than_a_fringe() {
+        let points = in_plane(&base_law(), &[10.0, 30.0, 50.0, 70.0], 5.0);
+        let points = Points { points, ..crate::diagnose::curve::testing::curve_of(Vec::new()) };
+        assert!(fringes(&points, &[0.9, 0.2]) < 0.2);
+        assert!(fringes(&points, &[0.4, 3.2]) > 1.4);
+    }
+
+    #[test]
+    fn a_number_at_a_bound_is_not_trusted_unless_there_it_means_nothing() {
+        assert!(is_inside(&ThinFilm, &[0.4, 3.2]));
+        assert!(!is_inside(&ThinFilm, &[0.95, 3.2]));
+        assert!(!is_inside(&ThinFilm, &[0.4, 20.0]));
+        let lobe = crate::diagnose::curve::term("diffuse-lobe").unwrap();
+        assert!(is_inside(lobe, &[0.01]) && !is_inside(lobe, &[50.0]));
+    }
+}
