@@ -1,6 +1,6 @@
 //! The findings on a fit, from its rows, its numbers and their uncertainty.
 
-use super::coordinates::{DIFFUSE_LEVEL, SPECULAR_LEVEL};
+use super::coordinates::{DIFFUSE_LEVEL, LOOKS, SPECULAR_LEVEL};
 use super::interval::DEVIATE_95;
 use super::result::FitResult;
 use super::search::SearchResult;
@@ -15,6 +15,9 @@ use crate::material::{Estimate, Observation};
 const CORRELATED: f64 = 0.95;
 /// Kolmogorov's distance times √rows that chance exceeds once in a hundred times.
 const KOLMOGOROV_1_PERCENT: f64 = 1.63;
+/// Detections for each fitted number below which the model is not tested, and in all.
+const ROWS_PER_NUMBER: usize = 3;
+const LEAST_ROWS: usize = 12;
 /// The split where the method has none, degrees.
 const SPLIT_DEG: f64 = 6.0;
 
@@ -50,6 +53,13 @@ pub(super) fn judge(
         findings.retain(|finding| !is_level_at_bound(finding));
         findings.push(Finding::OutOfRange { problem: format!("{path} would be {value}"), held });
     }
+    let looks = result.estimate(LOOKS).and_then(|looks| Some((looks.value, looks.interval_95?)));
+    if let Some((looks, [_, high])) = looks
+        && result.fit.method == Method::Censored
+        && high < 1.0
+    {
+        findings.push(Finding::MoreThanSpeckle { looks });
+    }
     let limit = KOLMOGOROV_1_PERCENT / f64::from(result.goodness.rows.max(1)).sqrt();
     let ks_distance = result.goodness.ks_distance;
     if result.fit.method == Method::Censored && ks_distance > limit {
@@ -81,6 +91,10 @@ fn judge_rows(result: &FitResult, rows: &[Observation]) -> Vec<Finding> {
     }
     if is_mixture && near == detected.len() {
         findings.push(Finding::NoDiffuseRows { above_deg: split_deg });
+    }
+    let unknowns = result.estimates.len();
+    if detected.len() < LEAST_ROWS.max(ROWS_PER_NUMBER * unknowns) {
+        findings.push(Finding::FewRows { detected: detected.len(), unknowns });
     }
     let censored = rows.len() - detected.len();
     if result.fit.method != Method::Censored && censored > 0 {

@@ -298,4 +298,16 @@ mod tests {
         assert!((s / value(&found, SPECULAR_LEVEL) - 1.0).abs() < 1e-9);
         assert!((r / value(&found, DIFFUSE_LEVEL) - 1.0).abs() < 1e-9);
     }
+    #[test]
+    fn seven_levels_that_no_law_explains_are_not_said_to_tell_every_number() {
+        // Measured averages of the sea at 9.3 GHz, VV, sea state 3 (Nathanson, in NRL/MR/5310--12-9346).
+        let sea =
+            "theta_deg,sigma0_db\n30,-16\n60,-26\n80,-32\n87,-38\n89,-39\n89.7,-45\n89.9,-51\n";
+        let curve = Curve::read(sea.as_bytes()).unwrap();
+        let lambert = Brdf::Lambert(Lambert { albedo: 0.1 });
+        let found = Fit::default().run(&lambert, &curve).unwrap();
+        let says = |wanted: fn(&Finding) -> bool| found.verdict.iter().any(wanted);
+        assert!(says(|one| matches!(one, Finding::FewRows { detected: 7, .. })), "{found:?}");
+        assert!(says(|one| matches!(one, Finding::MoreThanSpeckle { .. })), "{found:?}");
+    }
 }

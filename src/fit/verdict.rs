@@ -100,6 +100,18 @@ pub enum Finding {
         /// What it reflects there in all, over what it receives.
         albedo: f64,
     },
+    /// Too few detections to test the model.
+    FewRows {
+        /// Number of detections.
+        detected: usize,
+        /// Number of fitted numbers.
+        unknowns: usize,
+    },
+    /// The detections scatter about the model by more than a single look of speckle does.
+    MoreThanSpeckle {
+        /// Fitted looks.
+        looks: f64,
+    },
     /// The fitted distribution does not explain the rows.
     PoorFit {
         /// Kolmogorov distance of the residuals from their expected distribution.
@@ -194,6 +206,17 @@ impl fmt::Display for Finding {
                 let excess = Excess { theta_rad: theta_deg.to_radians(), albedo: *albedo };
                 write!(f, "the model {}; nothing is cut off", excess.words())
             }
+            Finding::FewRows { detected, unknowns } => write!(
+                f,
+                "{detected} detected levels are too few to test a model with {unknowns} numbers: the \
+                 intervals hold only if the model is right"
+            ),
+            Finding::MoreThanSpeckle { looks } => write!(
+                f,
+                "the levels scatter by more than one look of speckle does (looks = {}): the model or the \
+                 levels are off, which the intervals do not include",
+                significant(*looks, 2)
+            ),
             Finding::PoorFit { ks_distance, limit } => write!(
                 f,
                 "the model does not explain the data: the residuals are {ks_distance:.3} away from \

@@ -270,8 +270,11 @@ fn verdict(stored: &[String], found: &[Finding]) -> Vec<String> {
 /// Whether a finding is so near to its limit that another search may miss it.
 fn is_borderline(finding: &Finding) -> bool {
     match finding {
-        // A report of an earlier program does not speak of energy.
-        Finding::StartsDisagree { .. } | Finding::TooMuch { .. } => true,
+        // A report of an earlier program does not speak of energy, few rows and more than speckle.
+        Finding::StartsDisagree { .. }
+        | Finding::TooMuch { .. }
+        | Finding::FewRows { .. }
+        | Finding::MoreThanSpeckle { .. } => true,
         Finding::PoorFit { ks_distance, limit } => *ks_distance < (1.0 + BORDERLINE) * limit,
         Finding::HardToTellApart { correlation, .. } => correlation.abs() < 0.96,
         _ => false,
