@@ -333,6 +333,11 @@ fn materials_that_are_not_there() {
     check(&run(&["add", "ptfe@1"]), &["bare name"]);
     check(&run(&["add", "--from", "none.toml"]), &["cannot read none.toml"]);
     check(&run(&["add", "--from", "."]), &["holds no material.toml"]);
+    let predict = |angles: &str| run(&["predict", "ptfe", "--angles", angles]);
+    for (angles, says) in [("0:80", "no list of angles"), ("0:90:5", "90°"), ("x", "not a number")]
+    {
+        assert!(predict(angles).contains(says), "{}", predict(angles));
+    }
     let plot = |rest: &[&str]| run(&[&["plot", "ptfe"], rest].concat());
     check(&plot(&["-o", "x.pdf"]), &["x.pdf", ".svg or .png"]);
     check(&plot(&["-o", "x.png", "--sweep", "m=1"]), &["no parameter `m`", "specular.m"]);

@@ -20,14 +20,18 @@ const LOOKS: f64 = 4.0;
 const M: f64 = 0.1;
 const ALPHA: f64 = 5.0;
 
-/// A curve of a known mixture with speckle of four looks, tilted by 1°, cut off at a threshold.
-fn curve(from_deg: f64, to_deg: f64, rows: u32) -> String {
+fn truth() -> Brdf {
     let text = format!(
         r#"{{"model": "mixture", "k": 0.1,
             "specular": {{"model": "cook-torrance", "f_lambda": 0.06, "m": {M}}},
             "diffuse": {{"model": "blinn-phong", "r_s": 0.05, "alpha": {ALPHA}}}}}"#
     );
-    let truth: Brdf = serde_json::from_str(&text).unwrap();
+    serde_json::from_str(&text).unwrap()
+}
+
+/// A curve of a known mixture with speckle of four looks, tilted by 1°, cut off at a threshold.
+fn curve(from_deg: f64, to_deg: f64, rows: u32) -> String {
+    let truth = truth();
     let row = |chirp: u32| {
         let key = Key { seed: 5, chirp: u64::from(chirp), sub_ray: 0, purpose: Purpose::Speckle };
         let mut draws = key.draws();
@@ -100,6 +104,32 @@ fn a_curve_is_fitted_stored_rendered_and_listed() {
     text(folder, &["plot", "human-skin-300-ghz", "-o", "plot.svg"]);
     let plot = fs::read_to_string(folder.join("plot.svg")).unwrap();
     assert!(plot.contains("scan, below the threshold here") && plot.contains("mixture-censored"));
+
+    // The stored law with its band, within which the truth lies at angles that the curve has.
+    let predict = ["predict", "human-skin-300-ghz", "--angles", "0:50:10", "-o", "levels.csv"];
+    let predicted = json(folder, &predict);
+    assert_eq!(
+        (&predicted["law"], &predicted["no_band"]),
+        (&"mixture-censored".into(), &Value::Null)
+    );
+    let levels = predicted["levels"].as_array().unwrap();
+    assert_eq!(levels.len(), 6);
+    for level in levels {
+        let theta_rad = level["theta_deg"].as_f64().unwrap().to_radians();
+        let [low_db, high_db] = [0, 1].map(|end| level["band_db"][end].as_f64().unwrap());
+        let sigma0_db = level["sigma0_db"].as_f64().unwrap();
+        let true_db = db_from_ratio(truth().sigma0(theta_rad));
+        // Half as wide again: six angles of one fit may lie off together.
+        let slack_db = 0.25 * (high_db - low_db);
+        assert!((low_db..high_db).contains(&sigma0_db), "{level}");
+        assert!((low_db - slack_db..high_db + slack_db).contains(&true_db), "{true_db}: {level}");
+    }
+    let csv = fs::read_to_string(folder.join("levels.csv")).unwrap();
+    assert!(
+        csv.starts_with("theta_deg,sigma0_db,below_db,low_db,high_db,outside_deg\n0,"),
+        "{csv}"
+    );
+    assert_eq!(csv.lines().count(), 7);
 
     json(folder, &["render", scene("human.toml").to_str().unwrap(), "-o", "out"]);
     let record: Value =

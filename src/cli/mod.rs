@@ -21,6 +21,7 @@ mod list;
 mod measure;
 mod near;
 mod plot;
+mod predict;
 mod publish;
 mod radar;
 mod render;
@@ -91,6 +92,7 @@ enum Command {
     History(history::Args),
     Cite(cite::Args),
     Plot(plot::Args),
+    Predict(predict::Args),
     Fit(Box<fit::Args>),
     Check(check::Args),
     Rm(rm::Args),
@@ -127,6 +129,7 @@ pub fn run(cli: &Cli) -> Result<(), Error> {
         Command::History(args) => history::run(args, db, &console),
         Command::Cite(args) => cite::run(args, db, &console),
         Command::Plot(args) => plot::run(args, db, &console),
+        Command::Predict(args) => predict::run(args, db, &console),
         Command::Fit(args) => fit::run(args, db, &console),
         Command::Check(args) => check::run(args, db, &console),
         Command::Rm(args) => rm::run(args, db, &console),

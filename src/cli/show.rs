@@ -11,7 +11,7 @@ use crate::error::Error;
 use crate::formats::EffectEntry;
 use crate::material::{Fit, Material};
 use crate::radar::Radar;
-use crate::report::{LevelRow, Sigma0Level, drawn_words, level_rows};
+use crate::report::{AT_A_GLANCE_DEG, LevelRow, Sigma0Level, drawn_words, level_rows};
 use crate::setup::Database;
 use crate::setup::{
     MaterialRevision, find_material, later_status_warning, unmet_conditions, unmet_sentence,
@@ -185,7 +185,8 @@ fn source_of(fit: &Fit, path: &str) -> String {
 }
 
 fn curve_table(material: &Material) -> Result<String, Error> {
-    let rows = level_rows(material)?.map(|LevelRow { theta_deg, level, outside_deg }| {
+    let rows = level_rows(material, &AT_A_GLANCE_DEG)?;
+    let rows = rows.into_iter().map(|LevelRow { theta_deg, level, outside_deg }| {
         let level = match level {
             Sigma0Level::BelowDb(threshold_db) => format!("< {threshold_db:.1}"),
             Sigma0Level::Db(sigma0_db) => format!("{sigma0_db:.1}"),
@@ -198,6 +199,6 @@ fn curve_table(material: &Material) -> Result<String, Error> {
         };
         [format!("{theta_deg:.0}°"), level, said]
     });
-    let table = table(&["incidence", "sigma0 dB", ""], rows.into_iter());
+    let table = table(&["incidence", "sigma0 dB", ""], rows);
     Ok(drawn_words(material)?.map_or(table.clone(), |words| format!("{table}{words}\n")))
 }

@@ -38,14 +38,17 @@ pub fn drawn_words(material: &Material) -> Result<Option<String>, Error> {
     }))
 }
 
-/// The levels of a material from 0° to 75°.
+/// Angles of a table that shows a material at a glance, °.
+pub const AT_A_GLANCE_DEG: [f64; 9] = [0.0, 2.0, 5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 75.0];
+
+/// The levels of a material at these angles, °, from 0 to below 90.
 ///
 /// # Errors
 /// A material whose rendered model is not there.
-pub fn level_rows(material: &Material) -> Result<[LevelRow; 9], Error> {
+pub fn level_rows(material: &Material, angles_deg: &[f64]) -> Result<Vec<LevelRow>, Error> {
     let scattering = material.scattering()?;
     let reach = material.reach();
-    Ok([0.0, 2.0, 5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 75.0].map(|theta_deg: f64| {
+    let rows = angles_deg.iter().map(|&theta_deg| {
         let theta_rad = theta_deg.to_radians();
         let sigma0_db = db_from_ratio(scattering.sigma0(theta_rad));
         let level = match reach.below_sigma0(theta_rad) {
@@ -55,5 +58,6 @@ pub fn level_rows(material: &Material) -> Result<[LevelRow; 9], Error> {
         };
         let outside_deg = rounded(reach.outside_rad(theta_rad).to_degrees());
         LevelRow { theta_deg, level, outside_deg }
-    }))
+    });
+    Ok(rows.collect())
 }

@@ -19,6 +19,7 @@ mod material_plot;
 mod measurement;
 mod neighbours;
 mod picture;
+mod prediction;
 mod radar;
 mod residuals;
 mod scan;
@@ -36,7 +37,7 @@ pub use curve::{CurveAnswer, CurveRequest};
 pub use effect_help::EffectHelp;
 pub use history::{RevisionRecord, revision_records};
 pub use json::{Record, json_file};
-pub use level_table::{LevelRow, Sigma0Level, drawn_words, level_rows};
+pub use level_table::{AT_A_GLANCE_DEG, LevelRow, Sigma0Level, drawn_words, level_rows};
 pub use material_export::{ExportReport, ExportRequest};
 pub use material_list::{MaterialList, MaterialRow, UnknownWord};
 pub use material_plot::{
@@ -46,6 +47,7 @@ pub use material_plot::{
 pub use measurement::{MeasurementReport, MeasurementRequest};
 pub use neighbours::{Neighbour, NeighbourReport, NeighbourSearch};
 pub use picture::Picture;
+pub use prediction::{PredictedLevel, Prediction, angles_deg};
 pub use radar::RadarReport;
 pub use scan::{
     BeatShape, Counts, PowerRange, ReceiverRecord, RegionRecord, RenderFiles, RenderProgress,

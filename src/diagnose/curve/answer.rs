@@ -129,7 +129,9 @@ impl Answer {
     /// what noise alone would leave.
     fn with_terms(selection: &Selection, one: &Compared, terms: &[&'static dyn Term]) -> Answer {
         let (after, ranking, added) = selection.run(one.state.clone(), terms);
+        let least_db = selection.settings.least_named_db;
         let is_trusted = selection.points.has_known_noise()
+            && added.iter().all(|one| one.evidence.size_db >= least_db)
             && are_trusted(selection.points, &one.state, &after, &added);
         if !is_trusted {
             let may_be = added.iter().map(|added| added.term.name()).collect();

@@ -99,10 +99,10 @@ pub(super) fn isolated(selection: &Selection, model: &Model, start: &Fit) -> Opt
     for _ in 0..REFITS {
         let residual_db = points.residuals_db(&model.levels_db(&fit.at, all));
         let scatter_db = robust_scatter_db(points, &residual_db, &used);
-        let far = |(point, residual): (&Point, &f64)| {
-            point.censored || residual.abs() <= FAR_OFF * scatter_db
-        };
-        let next: Vec<bool> = all.iter().zip(&residual_db).map(far).collect();
+        let pairs = all.iter().zip(&residual_db);
+        let next: Vec<bool> = pairs
+            .map(|(point, residual)| point.censored || residual.abs() <= FAR_OFF * scatter_db)
+            .collect();
         if next == used {
             break;
         }
@@ -144,11 +144,8 @@ fn robust_scatter_db(points: &Points, residual_db: &[f64], used: &[bool]) -> f64
 fn are_isolated(points: &[Point], used: &[bool]) -> bool {
     let both: Vec<(&Point, &bool)> = points.iter().zip(used).collect();
     both.chunk_by(|a, b| a.0.scan == b.0.scan).all(|scan| {
-        let is_used = |place: Option<&(&Point, &bool)>| place.is_some_and(|(_, used)| **used);
         let widest = ALWAYS_NARROW.max((WIDEST * scan.len() as f64) as usize);
-        let is_short = |run: &[(&Point, &bool)]| *run[0].1 || run.len() <= widest;
-        is_used(scan.first())
-            && is_used(scan.last())
-            && scan.chunk_by(|a, b| a.1 == b.1).all(is_short)
+        [scan.first(), scan.last()].into_iter().flatten().all(|(_, used)| **used)
+            && scan.chunk_by(|a, b| a.1 == b.1).all(|run| *run[0].1 || run.len() <= widest)
     })
 }

@@ -1,11 +1,11 @@
 //! Other scattering models, with which a curve is compared before any term: a lobe of another shape must not come out as
 //! an effect.
 
-use crate::brdf::{Brdf, CookTorrance, Distribution, Lambert, Shadowing, Sum};
+use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Lambert, Shadowing, Sum};
 use crate::fit::model;
 
 /// Models by name, with values from which a search starts.
-const BY_NAME: [&str; 4] = ["mixture", "mixture-ggx", "kirchhoff-go", "directive"];
+const BY_NAME: [&str; 5] = ["mixture", "mixture-ggx", "kirchhoff-go", "kirchhoff", "directive"];
 /// Two lobes over Lambert.
 const TWO_LOBES: [(&str, [Distribution; 2]); 3] = [
     ("two GGX lobes over Lambert", [Distribution::Ggx, Distribution::Ggx]),
@@ -20,7 +20,9 @@ pub(super) fn other_laws() -> Vec<(&'static str, Brdf)> {
         let parts = vec![flat(), lobe(narrow, 0.08), lobe(wide, 0.4)];
         (name, Brdf::Sum(Sum { parts }))
     });
-    named.chain(two).collect()
+    let diffuse = Brdf::BlinnPhong(BlinnPhong { r_s: 0.05, alpha: 5.0 });
+    let diffuse = Brdf::Sum(Sum { parts: vec![flat(), diffuse] });
+    named.chain(two).chain([("a diffuse lobe over Lambert", diffuse)]).collect()
 }
 
 /// The default scattering model: one GGX lobe over Lambert, with values to start from.

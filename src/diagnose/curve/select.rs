@@ -11,7 +11,7 @@ use super::settings::CurveDiagnosis;
 use super::terms::Term;
 
 /// Starts of a term that are followed to their end.
-const FOLLOWED: usize = 3;
+const FOLLOWED: usize = 8;
 /// Terms of a round that are judged on held-out angles.
 const SHORT_LIST: usize = 5;
 /// Difference in held-out ln p below which two terms predict equally well; so does less than one standard error.

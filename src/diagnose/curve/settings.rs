@@ -22,6 +22,8 @@ pub struct CurveDiagnosis {
     pub standard_errors: f64,
     /// Least change of the levels by a term, and least unexplained structure, dB.
     pub least_size_db: f64,
+    /// Least change of the levels by a term that gets a name, dB: laws and instruments err by less without a name.
+    pub least_named_db: f64,
     /// Probability by chance below which neighbouring residuals count as correlated.
     pub family_error: f64,
 }
@@ -35,6 +37,7 @@ impl Default for CurveDiagnosis {
             least_gain: 8.0,
             standard_errors: 2.0,
             least_size_db: 0.1,
+            least_named_db: 0.3,
             family_error: 0.005,
         }
     }

@@ -252,15 +252,16 @@ impl Term for ThinFilm {
         Material,
         "A flat film of index 1.5 interferes with itself: the lobes ripple with the path through it. The \
          thickness is optical, in wavelengths.",
-        "Maxima and minima that crowd towards grazing angles. No other term goes up and down more than \
-         once. Thicknesses with the same number of ripples over the angles cannot be distinguished.",
+        "Maxima and minima over the angle, in backscatter densest near 50°. No other term goes up and down more \
+         than once. Thicknesses with the same number of ripples over the angles cannot be distinguished.",
         EffectParameter::new("visibility", "1", [-0.95, 0.95], 0.0, 0.02),
         EffectParameter::new("thickness", "1", [0.1, 20.0], 1.0, 0.01),
     );
 
     fn starts(&self) -> Vec<Vec<f64>> {
-        let thicknesses: Vec<f64> = (0..60).map(|k| 0.2 + 0.1 * f64::from(k)).collect();
-        pairs(&[-0.2, 0.2], &thicknesses)
+        // A tenth of a wavelength is a fifth of the period of the ripple's phase.
+        let thicknesses: Vec<f64> = (2..=200).map(|k| 0.1 * f64::from(k)).collect();
+        pairs(&[-0.5, -0.2, 0.2, 0.5], &thicknesses)
     }
 
     fn scatter(&self, values: &[f64], law: &Brdf, point: &Point, f_per_sr: f64) -> f64 {

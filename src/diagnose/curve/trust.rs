@@ -23,20 +23,18 @@ pub(super) fn are_trusted(
     added: &[Addition],
 ) -> bool {
     let (_, values) = after.model.numbers(&after.fitted.at);
-    let is_trusted = |(one, values): (&Addition, &Vec<f64>)| {
+    added.iter().zip(&values).all(|(one, values)| {
         is_inside(one.term, values)
             && (one.term.name() != ThinFilm.name() || fringes(points, values) >= LEAST_FRINGES)
-    };
-    added.iter().zip(&values).all(is_trusted) && holds_in_repeats(points, before, after)
+    }) && holds_in_repeats(points, before, after)
 }
 
 /// Whether no number of a term is at a bound.
 fn is_inside(term: &dyn Term, values: &[f64]) -> bool {
     term.parameters().iter().zip(values).all(|(known, value)| {
         let margin = AT_BOUND * (known.max - known.min);
-        let is_absent_end = |bound: f64| bound == known.absent;
-        (value - known.min > margin || is_absent_end(known.min))
-            && (known.max - value > margin || is_absent_end(known.max))
+        (value - known.min > margin || known.min == known.absent)
+            && (known.max - value > margin || known.max == known.absent)
     })
 }
 

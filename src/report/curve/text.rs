@@ -72,8 +72,8 @@ pub(super) fn sentence(report: &CurveReport) -> String {
 pub(super) fn may_be(report: &CurveReport) -> Option<String> {
     (!report.may_be.is_empty()).then(|| {
         format!(
-            "may be {}: the law improves with that, but not to its noise, or not in every repeat, or with a \
-             number at its bound; a law of another shape would do the same",
+            "may be {}: the law improves with that, but not to its noise, by less than 0.3 dB, not in every \
+             repeat, or with a number at its bound; a law of another shape would do the same",
             listed(&report.may_be)
         )
     })

@@ -1,0 +1,202 @@
+"""Run matdb over the curves of generate.py, and compare its answers with the truth. See README.md."""
+
+import argparse
+import collections
+import concurrent.futures
+import hashlib
+import json
+import os
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+
+from generate import EFFECTS, NOISES, RANGES, SURFACES
+
+SAME = [{"diffuse-lobe", "limb-darkening"}, {"second-lobe", "instrument-lobe"}]  # alike in backscatter
+SHAPES = set().union(*SAME)  # another law has these, too
+ALL, CELL, SILENT = 0.01, 0.03, 0.10  # largest shares: names in part A, names in a cell of it, no name in part B
+LEAST = 34  # curves from which on a single name keeps a cell within its share
+LIMIT_S = 120
+
+
+def command(matdb, truth, path, folder):
+    model = ["--model", truth["declared"]] if truth["declared"] else []
+    if truth.get("command") == "fit":
+        return [matdb, "fit", path, *model, "--json"]
+    noise = ["--noise-db", str(truth["noise_db"])] if truth["noise_db"] else []
+    return [matdb, "diagnose", "--curve", path, *noise, *model, "--json", "-o", folder]
+
+
+def ask(matdb, truth, path):
+    """The verdict of a curve, and every effect with those that predict as well. `error` is no answer."""
+    start = time.time()
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            done = subprocess.run(command(matdb, truth, path, folder), capture_output=True, text=True, timeout=LIMIT_S)
+            said, error = json.loads(done.stdout), done.stderr.strip()
+        except subprocess.TimeoutExpired:
+            said, error = {}, f"no answer within {LIMIT_S} s"
+        except ValueError:
+            said, error = {}, done.stderr.strip() or f"status {done.returncode}"
+    out = {"seconds": time.time() - start}
+    if "verdict" not in said:
+        return {**out, "verdict": "error", "effects": [], "error": error}
+    if truth.get("command") == "fit":  # a gauge is a convention, and no doubt
+        doubts = [v["finding"] for v in said["verdict"] if v["finding"] != "gauge"]
+        return {**out, "verdict": "doubts" if doubts or done.returncode else "tells-every-number", "effects": []}
+    return {**out, "verdict": said["verdict"], "effects": [[e["name"], *e.get("class", [])] for e in said["effects"]]}
+
+
+def hashed(*parts):
+    return hashlib.sha256(b"\0".join(parts)).hexdigest()[:16]
+
+
+def content(path):
+    with open(path, "rb") as file:
+        return file.read()
+
+
+def answers(matdb, folder, truths, jobs):
+    """(truth, answer) of every curve. Answers are stored under program and curve; a stopped run goes on where it was."""
+    program = hashed(content(shutil.which(matdb) or matdb))
+    store, known = f"{folder}/answers-{program}.jsonl", {}
+    if os.path.exists(store):
+        with open(store) as file:
+            known = {a["key"]: a for a in map(json.loads, file)}
+    paths = [f"{folder}/{t['id']}.csv" for t in truths]
+    keys = [hashed(content(p), " ".join(command("", t, "", "")).encode()) for t, p in zip(truths, paths)]
+    pool = concurrent.futures.ThreadPoolExecutor(jobs)
+    try:
+        asked = {pool.submit(ask, matdb, t, p): k for t, p, k in zip(truths, paths, keys) if k not in known}
+        with open(store, "a") as file:
+            for future in concurrent.futures.as_completed(asked):
+                known[asked[future]] = {"key": asked[future], **future.result()}
+                file.write(json.dumps(known[asked[future]]) + "\n")
+                file.flush()
+    finally:
+        pool.shutdown(cancel_futures=True)
+    return [(t, known[k]) for t, k in zip(truths, keys)]
+
+
+def table(head, rows):
+    print("\n| " + " | ".join(head) + " |\n|---|" + "--:|" * (len(head) - 1))
+    for row in rows:
+        print("| " + " | ".join(map(str, row)) + " |")
+
+
+def share(some, of):
+    return f"{some} of {of}"
+
+
+def complete(pairs):
+    """Part A: whether any effect is named, by cell and by what was declared."""
+    cells = collections.defaultdict(lambda: [0, 0])
+    declared, names = collections.defaultdict(collections.Counter), collections.Counter()
+    for t, a in pairs:
+        cell = cells[t["law"], t["noise_db"], t["to_deg"]]
+        cell[0] += bool(a["effects"])
+        cell[1] += 1
+        declared[t["declared_is"]][f"{a['verdict']}, named" if a["effects"] else a["verdict"]] += 1
+        names.update(e[0] for e in a["effects"])
+    columns = [(n, r) for n in NOISES for r in RANGES]
+    print("\n## A. Nothing is missing: curves with a name")
+    table(["law", *(f"{n} dB, {r}°" for n, r in columns)],
+          [[law, *(share(*cells[law, *c]) if cells[law, *c][1] else "" for c in columns)] for law in SURFACES])
+    kinds = sorted(set().union(*declared.values()))
+    table(["declared law", *kinds], [[d, *(declared[d][k] for k in kinds)] for d in declared])
+    print("\nNames: " + (", ".join(f"{n} {c}" for n, c in names.most_common()) or "none"))
+    named = sum(n for n, _ in cells.values())
+    judged = {c: n for c, n in cells.items() if n[1] >= LEAST}
+    over = [c for c, (n, of) in judged.items() if n > CELL * of]
+    print(f"Named: {share(named, len(pairs))}, {named / len(pairs):.1%}, at most {ALL:.0%}. "
+          f"Cells above {CELL:.0%}: {share(len(over), len(judged))} with {LEAST} curves or more.")
+    return named <= ALL * len(pairs) and not over
+
+
+def right(effect, named):
+    same = next((s for s in SAME if effect in s), {effect})
+    return any(same & set(e) for e in named)
+
+
+def is_a_shape(truth, answer):
+    """Whether another law, of which the shape is a part, stands for the name of a shape."""
+    return answer["verdict"] == "another-law" and truth["effect"] in SHAPES and not answer["effects"]
+
+
+def missing(pairs):
+    """Part B: what is said where one effect is missing."""
+    counts = collections.defaultdict(collections.Counter)
+    for t, a in pairs:
+        row = counts[t["effect"]]
+        row["curves"] += 1
+        if is_a_shape(t, a):
+            row["right"] += 1
+            row["as another law"] += 1
+        elif not a["effects"]:
+            row[a["verdict"]] += 1
+        elif right(t["effect"], a["effects"]):
+            row["right"] += 1
+            row["right and more"] += len(a["effects"]) > 1
+        else:
+            row[a["effects"][0][0]] += 1
+    fixed = ["curves", "right", "right and more", "as another law", "unexplained", "no-missing-effect"]
+    others = sorted(set().union(*counts.values()) - set(fixed))
+    print("\n## B. One effect is missing: right or equivalent names, no name, and, last, the first of other names")
+    table(["missing", *fixed, *others], [[e, *(counts[e][k] for k in [*fixed, *others])] for e in EFFECTS if e in counts])
+    silent = sum(not a["effects"] and not is_a_shape(t, a) for t, a in pairs)
+    wrong = sum(bool(a["effects"]) and not right(t["effect"], a["effects"]) for t, a in pairs)
+    print(f"\nNo name: {share(silent, len(pairs))}, {silent / len(pairs):.1%}, at most {SILENT:.0%}. "
+          f"Another name: {share(wrong, len(pairs))}.")
+    return silent <= SILENT * len(pairs)
+
+
+def stand_ins(pairs):
+    """Part C: no name, and a verdict among those that are right."""
+    rows, misses = collections.defaultdict(collections.Counter), []
+    for t, a in pairs:
+        names = [e[0] for e in a["effects"]]
+        wrong = bool(names) or a["verdict"] not in t["verdicts"]
+        rows[t["kind"]].update(curves=1, misses=wrong, named=bool(names), **{"thin film": "thin-film" in names})
+        rows[t["kind"]][a["verdict"]] += 1
+        if wrong:
+            misses.append(f"- {t['id']}: {a['verdict']} {' '.join(names)} {a.get('error', '')}".rstrip())
+    fixed = ["curves", "misses", "named", "thin film"]
+    verdicts = sorted(set().union(*rows.values()) - set(fixed))
+    print("\n## C. Stand-ins for measured data")
+    table(["data", *fixed, *verdicts], [[kind, *(row[k] for k in [*fixed, *verdicts])] for kind, row in rows.items()])
+    print("\nMisses: " + str(len(misses)), *misses, sep="\n")
+    return not misses
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder")
+    parser.add_argument("--matdb", default="matdb")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--parts", default="ABC")
+    parser.add_argument("--count", type=int, default=10**9, help="the first curves of part A, and of part B")
+    parser.add_argument("--strict", action="store_true", help="exit with 1 unless every target is met")
+    a = parser.parse_args()
+    with open(f"{a.folder}/truth.jsonl") as file:
+        truths = [t for t in map(json.loads, file) if t["id"][0] in a.parts]
+    truths = [t for t in truths if t["id"][0] == "C" or int(t["id"][2:]) < a.count]
+    pairs = answers(a.matdb, a.folder, [t for t in truths if t.get("reached", True)], a.jobs)
+    met = bool(a.parts)
+    for part, judge in zip("ABC", (complete, missing, stand_ins)):
+        if part in a.parts:
+            mine = [(t, b) for t, b in pairs if t["id"][0] == part]
+            met &= bool(mine) and judge(mine)
+    small = sum(not t.get("reached", True) for t in truths)
+    errors = [f"- {t['id']}: {b['error']}" for t, b in pairs if b["verdict"] == "error"]
+    print(f"\nLeft out, as the effect cannot get that large: {small}. No answer: {len(errors)}.", *errors, sep="\n")
+    seconds = [b["seconds"] for _, b in pairs]
+    print(f"Seconds a curve: median {statistics.median(seconds or [0]):.2f}, longest {max(seconds, default=0):.1f}.")
+    if a.strict and (errors or not met):
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()
