@@ -58,14 +58,14 @@ fn what_is_put_in_is_found_with_its_numbers() {
     /// angle is 3.6 off in it.
     const OFF: f64 = 4.0;
     for (name, numbers) in [
-        ("limb-darkening", vec![0.3]),
+        ("limb-darkening", vec![0.6]),
         ("fresnel-growth", vec![6.0]),
-        ("subsurface", vec![0.02]),
-        ("thin-film", vec![0.4, 3.2]),
-        ("opposition", vec![0.5, 6.0]),
-        ("angle-offset", vec![1.5]),
-        ("instrument-lobe", vec![0.6, 2.5]),
-        ("stray-light", vec![0.003]),
+        ("subsurface", vec![0.06]),
+        ("thin-film", vec![0.8, 3.2]),
+        ("opposition", vec![1.0, 8.0]),
+        ("angle-offset", vec![2.5]),
+        ("instrument-lobe", vec![2.0, 4.0]),
+        ("stray-light", vec![0.01]),
     ] {
         let report = diagnosed(&curve_with(name, &numbers));
         let names: Vec<&str> = report.effects.iter().map(|found| found.name).collect();
@@ -151,7 +151,7 @@ fn isolated_peaks_are_not_taken_for_an_effect() {
 
 #[test]
 fn an_effect_must_hold_in_every_repeat() {
-    let [clean, film] = [("", vec![]), ("thin-film", vec![0.4, 3.2])]
+    let [clean, film] = [("", vec![]), ("thin-film", vec![0.8, 3.2])]
         .map(|(name, numbers)| values_with(name, &numbers));
     let repeated = |film_in_second: bool| {
         let second = if film_in_second { &film } else { &clean };
