@@ -368,6 +368,7 @@ fn every_command_has_help_with_an_example() {
         "show",
         "check",
         "plot",
+        "predict",
         "fit",
         "rm",
         "export",
