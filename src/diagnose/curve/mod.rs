@@ -2,8 +2,8 @@
 //! none, or that the missing part is unknown.
 //!
 //! As for a scan, the scattering model is refitted first, so that "before" is the best model
-//! without a term. Where it leaves no more than noise, nothing is missing. Else levels that lie far off by themselves are
-//! looked for, then other scattering models are tried, and only then terms. Every term is fitted with the model and must
+//! without a term. Where it leaves no more than noise, nothing is missing. Else other scattering models
+//! are tried, then levels that lie far off by themselves are looked for, and only then terms. Every term is fitted with the model and must
 //! predict runs of angles that took no part in its fit (`folds.rs`). It gets a name only where no more than noise remains.
 //!
 //! | step | file |
