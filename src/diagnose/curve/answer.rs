@@ -125,8 +125,8 @@ impl Answer {
         }
     }
 
-    /// A model with the terms that it supports. They get no name where one of them cannot be trusted, or where nobody knows
-    /// what noise alone would leave.
+    /// A model with the terms that it supports. They get no name where one of them cannot be trusted, or where the noise is
+    /// unknown.
     fn with_terms(selection: &Selection, one: &Compared, terms: &[&'static dyn Term]) -> Answer {
         let (after, ranking, added) = selection.run(one.state.clone(), terms);
         let least_db = selection.settings.least_named_db;

@@ -197,7 +197,7 @@ pub struct CurveReport {
     pub effects: Vec<FoundTerm>,
     /// Every term of every round.
     pub ranking: Vec<RankedTerm>,
-    /// Terms that improve the law and are not enough, or whose law of noise is unknown: they may stand for something else.
+    /// Terms that improve the law and get no name: more than noise remains, the noise is unknown, or they cannot be trusted.
     pub may_be: Vec<&'static str>,
     /// The scattering models that the curve was compared with: the others only where the first does not explain it.
     pub laws: Vec<ComparedLaw>,

@@ -61,7 +61,7 @@ pub(super) fn sentence(report: &CurveReport) -> String {
                 other => format!("another law, {other},"),
             };
             format!(
-                "{law} leaves no structure, but nobody knows how much noise alone would leave, so that \
+                "{law} leaves no structure, but the noise of a level is unknown, so that \
                  nothing can be called explained; repeat some angles, or state --noise-db"
             )
         }
