@@ -107,7 +107,13 @@ impl Write {
         let alone = vec![bystander.clone()];
         match self {
             Write::Make => [vec![], vec![]],
-            Write::Migrate => [contents(&first_schema()), contents(&first_schema())],
+            Write::Migrate => {
+                // A copy: readers at the same time may leave a log, and one would stay beside the fixture.
+                let folder = tempfile::tempdir().unwrap();
+                let copy = folder.path().join("copy.sqlite");
+                fs::copy(first_schema(), &copy).unwrap();
+                [contents(&copy), contents(&copy)]
+            }
             Write::Import => {
                 let [other, first] = ["other", "subject"].map(sound);
                 [alone, vec![bystander, other, first.clone(), change(first)]]

@@ -60,7 +60,8 @@ fn held(file: &str) -> [Material; 3] {
 fn files() -> Vec<String> {
     let names = fs::read_dir(fixtures()).unwrap().map(|entry| entry.unwrap().file_name());
     let names = names.map(|name| name.into_string().unwrap());
-    let mut files: Vec<String> = names.filter(|name| name.starts_with("schema-")).collect();
+    let is_schema = |name: &String| name.starts_with("schema-") && name.ends_with(".sqlite");
+    let mut files: Vec<String> = names.filter(is_schema).collect();
     files.sort();
     files
 }
