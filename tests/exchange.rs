@@ -61,7 +61,8 @@ fn given() -> Details {
 }
 
 fn water(text: &str, given: &Details) -> Result<Material, String> {
-    Foreign::OpticalConstants.read("water.yml", text.as_bytes(), given).map_err(|e| e.to_string())
+    let read = Foreign::OpticalConstants.read("water.yml", text.as_bytes(), given);
+    read.map(|(material, _)| material).map_err(|e| e.to_string())
 }
 
 #[test]
@@ -162,7 +163,7 @@ fn the_measured_constants_agree_with_their_summary() {
             continue;
         };
         let number = |column: usize| row[column].parse::<f64>().unwrap();
-        let material = Foreign::OpticalConstants.read("page.yml", &bytes, &given()).unwrap();
+        let (material, _) = Foreign::OpticalConstants.read("page.yml", &bytes, &given()).unwrap();
         let Brdf::Fresnel(mirror) = material.scattering().unwrap() else { panic!("not Fresnel") };
         let [low, high] = material.frequency_hz.map(|hz| hz / 1e9);
         let nearest_ghz = if high == 300.0 { low } else { high };
@@ -196,7 +197,7 @@ fn a_curve_survives_csv_and_universal_brdf() {
             threshold_w: Some(2e-11),
             ..given()
         };
-        let back = foreign.read("back", text.as_bytes(), &given).unwrap();
+        let (back, _) = foreign.read("back", text.as_bytes(), &given).unwrap();
         let back = &back.curves[0].observations;
         assert_eq!(back.len(), curve.len());
         for (a, b) in curve.iter().zip(back) {
@@ -614,7 +615,7 @@ proptest! {
             frequency_hz: Some(300e9),
             ..given()
         };
-        if let Ok(material) = foreign.read("file", &bytes, &given) {
+        if let Ok((material, _)) = foreign.read("file", &bytes, &given) {
             let model = material.scattering().unwrap();
             prop_assert!(model.sigma0(0.3).is_finite());
         }

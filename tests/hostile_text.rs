@@ -7,6 +7,7 @@ use std::path::Path;
 
 use matdb::brdf::{Brdf, Lambert, Scattering};
 use matdb::effects::{Level, Receiver, SceneEffects, resolve};
+use matdb::formats::ColumnNames;
 use matdb::material::file::{parse, points};
 use matdb::radar::Pattern;
 use matdb::render::{Bounce, Observer, Setup, Surface, power_image, shade, trace, trace_placed};
@@ -240,6 +241,6 @@ proptest! {
 
     #[test]
     fn curves(text in damaged(CURVE)) {
-        let _ = points(text.as_bytes());
+        let _ = points(text.as_bytes(), &ColumnNames::default());
     }
 }

@@ -296,8 +296,9 @@ fn covariance(paths: &[String], scale: &[f64]) -> Covariance {
 
 fn curve() -> impl Strategy<Value = Curve> {
     let footprint = option::of(select(vec![Footprint::Paper, Footprint::Projected]));
-    let illumination = (footprint, option::of(1e-4f64..0.5))
-        .prop_map(|(footprint, beam_rad)| Illumination { footprint, beam_rad });
+    let illumination = (footprint, option::of(1e-4f64..0.5)).prop_map(|(footprint, beam_rad)| {
+        Illumination { footprint, beam_rad, ..Illumination::default() }
+    });
     (vec(observation(), 1..20), illumination).prop_map(|(observations, illumination)| {
         let (name, source) = (String::new(), String::new());
         Curve { name, source, instrument: None, session: None, illumination, observations }

@@ -16,10 +16,10 @@ use matdb::store::{Addition, Store};
 use rusqlite::Connection;
 use rusqlite::functions::FunctionFlags;
 use support::database::{
-    attributed, change, complete, contents, fitted, lit, placed, sample, with_effects,
+    attributed, change, complete, contents, fitted, lit, placed, relative, sample, with_effects,
 };
 
-const NEWEST: &str = "schema-0012.sqlite";
+const NEWEST: &str = "schema-0013.sqlite";
 
 fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures")
@@ -46,7 +46,8 @@ fn held(file: &str) -> [Material; 3] {
         "schema-0004.sqlite" | "schema-0005.sqlite" | "schema-0006.sqlite" => complete,
         "schema-0007.sqlite" | "schema-0008.sqlite" => attributed,
         "schema-0009.sqlite" | "schema-0010.sqlite" | "schema-0011.sqlite" => placed,
-        _ => lit,
+        "schema-0012.sqlite" => lit,
+        _ => relative,
     };
     let mut held = [make("paint"), change(make("paint")), make("primer")];
     if file < "schema-0008.sqlite" {
@@ -344,6 +345,10 @@ fn the_database_itself_refuses_what_a_material_may_not_be() {
         "UPDATE curve_illumination SET beam_rad = 0",
         "UPDATE curve_illumination SET footprint = NULL, beam_rad = NULL",
         "UPDATE curve_illumination SET curve = 'other'",
+        "UPDATE curve_levels SET relative = 2",
+        "UPDATE curve_levels SET only_detected = -1",
+        "UPDATE curve_levels SET relative = 0, only_detected = 0",
+        "UPDATE curve_levels SET curve = 'other'",
         "UPDATE fit_lobes SET lobes = 'radar-and-surface'",
         "UPDATE fit_lobes SET fit = 'other'",
         "UPDATE fit_number SET fit = 'other'",

@@ -1,6 +1,8 @@
-"""Writes the detections of a cloud.ply of `matdb render` as a CSV of what a radar would have measured.
+"""Writes the detections of a cloud.ply of `matdb render` as what a radar would have measured: a CSV with our names, or
+places and powers alone, as `numpy.savetxt` of somebody else's script writes them.
 
     python3 ply_to_csv.py cloud.ply cloud.csv
+    python3 ply_to_csv.py cloud.ply scan.xyz
 """
 
 import struct
@@ -15,8 +17,11 @@ count = next(int(words[2]) for words in lines if words[:2] == ["element", "verte
 properties = [words[1:] for words in lines if words[0] == "property"]
 row = struct.Struct("<" + "".join(TYPES[kind] for kind, _ in properties))
 
+THEIRS = {"x": "X", "y": "Y", "z": "Z", "power_dbm": "Intensity"}
+columns, form, mark = (THEIRS, ".18e", " ") if sys.argv[2].endswith(".xyz") else (COLUMNS, ".8g", ",")
+
 with open(sys.argv[2], "w") as file:
-    print(*COLUMNS.values(), sep=",", file=file)
+    print(*columns.values(), sep=mark, file=file)
     for values in row.iter_unpack(rows[: count * row.size]):
         point = dict(zip((name for _, name in properties), values))
-        print(*(f"{point[name]:.8g}" for name in COLUMNS), sep=",", file=file)
+        print(*(format(point[name], form) for name in columns), sep=mark, file=file)

@@ -4,10 +4,12 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
+use matdb::formats::ColumnNames;
 use matdb::measure::in_plane::{read_bsdf, read_table};
 
 fuzz_target!(|bytes: &[u8]| {
-    for value in [read_table(bytes), read_bsdf(bytes)].into_iter().flatten().flatten() {
+    let table = read_table(bytes, &ColumnNames::default()).map(|(table, _)| table);
+    for value in [table, read_bsdf(bytes)].into_iter().flatten().flatten() {
         assert!(value.theta_i_rad.cos() > 0.0 && value.theta_s_rad.cos() > 0.0);
         assert!(value.f_per_sr.is_finite() && value.f_per_sr > 0.0);
     }

@@ -7,6 +7,7 @@ use crate::brdf::Brdf;
 use crate::error::Error;
 use crate::fit::coordinates::frequencies;
 use crate::fit::{Fit, FitResult, Method, model, model_names};
+use crate::formats::ColumnNames;
 use crate::formats::text::nearest;
 use crate::material;
 use crate::radar::speckle::standard_deviation_db;
@@ -21,6 +22,8 @@ pub struct FitRequest<'a> {
     /// Curve of the material, by default the longest; or the name to store a file's curve under, by default the
     /// file's.
     pub curve: Option<&'a str>,
+    /// Our names for the columns of a file.
+    pub columns: ColumnNames,
     /// A model or a material, where the search starts; by default what the material renders, else `mixture`.
     pub model: Option<&'a str>,
     /// How to fit.
@@ -112,6 +115,7 @@ impl<'a> FitRequest<'a> {
         FitRequest {
             what,
             curve: None,
+            columns: ColumnNames::default(),
             model: None,
             method: FitMethod::Censored,
             alpha: None,
@@ -133,16 +137,16 @@ impl<'a> FitRequest<'a> {
     /// # Errors
     /// A curve, a material or a model that is not known; settings that do not suit them; what cannot be stored.
     pub fn check(self, store: Option<&Store>) -> Result<CheckedFit, Error> {
-        let subject = FitSubject::open(self.what, self.curve, store)?;
+        let subject = FitSubject::open(self.what, self.curve, &self.columns, store)?;
         let start = self.start(&subject, store)?;
         let fit = self.settings(&subject, &start)?;
         let fit_name = self.name(&start);
-        let mut notices = Vec::new();
+        let mut notices = subject.notices.clone();
         if let Some(storage) = &self.storage {
             let material = storage.check(&subject, &fit_name, store);
             let material = material.map_err(|error| how_to_add(error, &subject))?;
             if subject.file.is_some() {
-                notices = admission::doubts(&material);
+                notices.extend(admission::doubts(&material));
             }
         }
         Ok(CheckedFit { subject, start, fit, fit_name, notices, storage: self.storage })

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::brdf::Brdf;
 use crate::error::Error;
 use crate::files::{FilesError, WayOut, read_small};
+use crate::formats::ColumnNames;
 use crate::material;
 use crate::measure::Curve;
 use crate::setup::{MaterialRevision, find_material};
@@ -25,35 +26,42 @@ pub struct FitSubject {
     pub found: Option<MaterialRevision>,
     /// The file; `None` for a curve of a material.
     pub file: Option<PathBuf>,
+    /// What a person should know of the file.
+    pub notices: Vec<String>,
 }
 
 impl FitSubject {
     /// Reads the curve of a CSV file, or finds that of a material, `NAME` or `NAME@REVISION`. `curve` names the
     /// curve of the material, by default the longest, or the name under which that of a file is to be stored, by
-    /// default the file's.
+    /// default the file's. `columns` are our names for the columns of a file.
     ///
     /// # Errors
     /// A file that cannot be read; a material or a curve that is not known.
     pub fn open(
         wanted: &str,
         curve: Option<&str>,
+        columns: &ColumnNames,
         store: Option<&Store>,
     ) -> Result<FitSubject, Error> {
         let path = Path::new(wanted);
         if wanted.ends_with(".csv") || path.is_file() {
-            FitSubject::of_file(path, curve)
+            FitSubject::of_file(path, curve, columns)
         } else {
             FitSubject::of_material(wanted, curve, find_material(store, wanted, "")?)
         }
     }
 
-    fn of_file(path: &Path, curve: Option<&str>) -> Result<FitSubject, Error> {
+    fn of_file(
+        path: &Path,
+        curve: Option<&str>,
+        columns: &ColumnNames,
+    ) -> Result<FitSubject, Error> {
         let label = path.display().to_string();
         let bytes = read_small(path).map_err(|error| FilesError {
             way_out: WayOut::Words("check the path, or name a material"),
             ..error
         })?;
-        let points = Curve::read(&bytes)
+        let (points, notices) = Curve::read_as(&bytes, columns)
             .map_err(|error| Error::CurveFile { file: path.to_owned(), error })?;
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         Ok(FitSubject {
@@ -63,6 +71,7 @@ impl FitSubject {
             curve: points,
             found: None,
             file: Some(path.to_owned()),
+            notices,
         })
     }
 
@@ -89,6 +98,7 @@ impl FitSubject {
             curve: points,
             found: Some(found),
             file: None,
+            notices: Vec::new(),
         })
     }
 

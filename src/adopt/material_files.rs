@@ -63,7 +63,8 @@ impl NewMaterials {
             for file in material_files(path)? {
                 let (material, inputs) = match foreign_format(&file) {
                     Some(format) => {
-                        let (material, input) = read_foreign(format, &file, given)?;
+                        let (material, notices, input) = read_foreign(format, &file, given)?;
+                        new.notices.extend(notices);
                         let unknown = material.unknown.iter();
                         new.notices.extend(unknown.map(|what| format!("not known: {what}")));
                         (material, vec![input])
@@ -199,12 +200,16 @@ fn read_material(path: &Path) -> Result<(Material, Vec<Input>), Error> {
     Ok((material, inputs.into_inner()))
 }
 
-/// Reads a file in a foreign format.
-fn read_foreign(format: Foreign, path: &Path, given: &Details) -> Result<(Material, Input), Error> {
+/// Reads a file in a foreign format, with notices on it.
+fn read_foreign(
+    format: Foreign,
+    path: &Path,
+    given: &Details,
+) -> Result<(Material, Vec<String>, Input), Error> {
     let bytes = read_small(path).map_err(suggest_tables)?;
-    let material = format.read(&path.display().to_string(), &bytes, given)?;
+    let (material, notices) = format.read(&path.display().to_string(), &bytes, given)?;
     admission::check(&material, path)?;
-    Ok((material, input(path, &bytes)))
+    Ok((material, notices, input(path, &bytes)))
 }
 
 /// The error for a material's file, with the way out for one that is too large.

@@ -119,7 +119,7 @@ impl Probe {
         lobes: Lobes,
     ) -> Option<Distance> {
         let beam_rad = if self.widens(lobes) { self.illumination.beam_rad } else { None };
-        let own = Illumination { footprint, beam_rad };
+        let own = Illumination { footprint, beam_rad, ..self.illumination };
         let seen = ThroughBeam { law, beam_rad: beam_rad.unwrap_or(0.0) };
         let reduced = |i: Direction<Surface>, o: Direction<Surface>| {
             own.factor_to(self.illumination.footprint, i.cos_theta()) * seen.f_per_sr(i, o)
@@ -191,7 +191,7 @@ impl Probe {
             Some(ends) => ends,
             None => return [self.floor_db; 2],
         };
-        let own = Illumination { footprint, beam_rad: None };
+        let own = Illumination { footprint, ..Illumination::default() };
         // The factor of a footprint rises or falls throughout.
         let [first_db, last_db] = [bin.first_degree, bin.last_degree + 1].map(|degree| {
             let cos_theta = (degree as f64).to_radians().cos();

@@ -49,7 +49,7 @@ pub(super) struct Args {
 }
 
 /// A complete material.toml; docs/materials.md shows the same.
-const TEMPLATE: &str = include_str!("add/template.toml");
+pub(super) const TEMPLATE: &str = include_str!("add/template.toml");
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     if args.template {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::cloud::CloudArgs;
+use super::cloud::{CloudArgs, ColumnArgs};
 use super::console::Console;
 use crate::error::Error;
 use crate::measure::Calibration;
@@ -19,6 +19,8 @@ Built-in scenes: builtin:calibration-plate, builtin:calibration-sphere, builtin:
 pub(super) struct Args {
     #[command(flatten)]
     cloud: CloudArgs,
+    #[command(flatten)]
+    columns: ColumnArgs,
     /// The scene that was measured: its radar, its scan and a single target
     #[arg(long, value_name = "SCENE")]
     scene: PathBuf,
@@ -35,7 +37,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         ));
     }
     let ready = ReadyScene::open(&args.scene, db.read()?.as_ref())?;
-    let cloud = args.cloud.read(ready.scene.radar())?;
+    let cloud = args.cloud.read_absolute(&args.cloud.cloud, &args.columns, ready.scene.radar())?;
     let calibration = Calibration { within_db: args.within };
     let report = CalibrationReport::new(&ready, &cloud, &args.cloud.cloud, calibration)?;
     let notices = [cloud.notices, ready.notices(), report.notices()].concat();

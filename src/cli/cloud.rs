@@ -5,25 +5,42 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use crate::error::Error;
-use crate::frames::{Global, Pose};
-use crate::measure::{Cloud, CloudReading, PowerUnit, Start};
+use crate::formats::ColumnNames;
+use crate::frames::{Global, Point, Pose};
+use crate::material::Scale;
+use crate::measure::{Cloud, CloudError, CloudReading, PowerUnit, Start};
 use crate::radar::Radar;
 use crate::setup::{read_cloud, read_pose};
 
 /// A cloud file and what it does not say of itself.
 #[derive(Debug, clap::Args)]
 pub(super) struct CloudArgs {
-    /// Measured cloud: .ply, .csv (x_m,y_m,z_m,power_dbm, chirp and range_m if known) or .xyz
+    /// Measured cloud: .ply, .csv, .xyz, .pcd, .las or .laz
     pub cloud: PathBuf,
     /// Unit of x, y and z where the columns do not name it
     #[arg(long, value_name = "UNIT", default_value = "m")]
     unit: LengthUnit,
-    /// Unit of the power where the column does not name it
+    /// Unit of the power where the column does not name it; `relative` (dB) and `counts` are of an unknown level
     #[arg(long, value_name = "UNIT", default_value = "dbm")]
     power: PowerFlag,
     /// Frame of the positions
     #[arg(long, value_name = "FRAME", default_value = "global")]
     frame: Frame,
+}
+
+/// What the columns of a file are.
+#[derive(Debug, clap::Args)]
+pub(super) struct ColumnArgs {
+    /// Our names for the columns of the file, as in X=x_m,Intensity=power_dbm; - passes one over
+    #[arg(long, value_name = "THEIRS=OURS")]
+    columns: Option<ColumnNames>,
+}
+
+impl ColumnArgs {
+    /// Our names for the columns.
+    pub fn names(&self) -> ColumnNames {
+        self.columns.clone().unwrap_or_default()
+    }
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
@@ -36,6 +53,8 @@ enum LengthUnit {
 enum PowerFlag {
     Dbm,
     W,
+    Relative,
+    Counts,
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
@@ -46,12 +65,34 @@ enum Frame {
 
 impl CloudArgs {
     /// Reads the cloud; `radar` says where its target frame lies.
-    pub fn read(&self, radar: &Radar) -> Result<Cloud, Error> {
-        self.read_another(&self.cloud, radar)
+    pub fn read(&self, columns: &ColumnArgs, radar: &Radar) -> Result<Cloud, Error> {
+        self.read_another(&self.cloud, columns, radar)
+    }
+
+    /// Reads a cloud by the same flags, whose powers must be known.
+    pub fn read_absolute(
+        &self,
+        path: &Path,
+        columns: &ColumnArgs,
+        radar: &Radar,
+    ) -> Result<Cloud, Error> {
+        let cloud = self.read_another(path, columns, radar)?;
+        match cloud.scale {
+            Scale::Absolute => Ok(cloud),
+            Scale::Relative => {
+                let error = CloudError::Relative;
+                Err(Error::Cloud { file: path.to_owned(), error })
+            }
+        }
     }
 
     /// Reads another cloud by the same flags.
-    pub fn read_another(&self, path: &Path, radar: &Radar) -> Result<Cloud, Error> {
+    fn read_another(
+        &self,
+        path: &Path,
+        columns: &ColumnArgs,
+        radar: &Radar,
+    ) -> Result<Cloud, Error> {
         let reading = CloudReading {
             metres_per_unit: match self.unit {
                 LengthUnit::M => 1.0,
@@ -60,7 +101,10 @@ impl CloudArgs {
             power: match self.power {
                 PowerFlag::Dbm => PowerUnit::Dbm,
                 PowerFlag::W => PowerUnit::Watt,
+                PowerFlag::Relative => PowerUnit::RelativeDb,
+                PowerFlag::Counts => PowerUnit::Counts,
             },
+            columns: columns.names(),
             global_from_target: match self.frame {
                 Frame::Global => None,
                 Frame::Target => Some(radar.frames().global_from_target),
@@ -89,6 +133,17 @@ pub(super) fn pose(text: Option<&str>) -> Result<Pose<Global, Global>, Error> {
             "--pose auto needs a registration",
             "run `matdb measure --pose auto` and give its pose.json here",
         )),
+    }
+}
+
+/// A place, X,Y,Z in m.
+pub(super) fn place(text: &str) -> Result<Point<Global>, String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    match numbers.unwrap_or_default()[..] {
+        [x, y, z] if [x, y, z].iter().all(|m| m.is_finite() && m.abs() <= 1e4) => {
+            Ok(Point::new(x, y, z))
+        }
+        _ => Err("give X,Y,Z in metres, as in 0,1.2,3".to_owned()),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::cloud::{CloudArgs, pose};
+use super::cloud::{CloudArgs, ColumnArgs, pose};
 use super::console::Console;
 use super::summary::grouped;
 use crate::error::Error;
@@ -23,6 +23,8 @@ Writes both images side by side, a line scan, and the error.")]
 pub(super) struct Args {
     #[command(flatten)]
     cloud: CloudArgs,
+    #[command(flatten)]
+    columns: ColumnArgs,
     /// The scene that was measured, with the materials to judge
     #[arg(long, value_name = "SCENE")]
     scene: PathBuf,
@@ -48,7 +50,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         ready.choose_fit(name)?;
     }
     let unstated = ready.check_footprints()?;
-    let cloud = args.cloud.read(ready.scene.radar())?;
+    let cloud = args.cloud.read_absolute(&args.cloud.cloud, &args.columns, ready.scene.radar())?;
     let comparison = Comparison::new(&ready, &cloud)?;
     let notices = [cloud.notices, ready.notices(), Vec::from_iter(unstated)].concat();
     let record = comparison.record(&args.cloud.cloud, &args.scene, &notices);

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::cloud::{CloudArgs, start};
+use super::cloud::{CloudArgs, ColumnArgs, start};
 use super::console::Console;
 use super::curves::{Circumstances, OWN, kind_of};
 use super::summary::grouped;
@@ -30,6 +30,8 @@ Then: matdb fit measured/curve.csv, or matdb fit my-paint --save")]
 pub(super) struct Args {
     #[command(flatten)]
     cloud: CloudArgs,
+    #[command(flatten)]
+    columns: ColumnArgs,
     /// The scene that was measured: its mesh, its radar and its scan
     #[arg(long, value_name = "SCENE")]
     scene: PathBuf,
@@ -94,7 +96,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     if let Some(storage) = &storage {
         storage.check(db.read()?.as_ref())?;
     }
-    let cloud = args.cloud.read(scene.radar())?;
+    let cloud = args.cloud.read(&args.columns, scene.radar())?;
     let request = MeasurementRequest {
         cloud_file: &args.cloud.cloud,
         cloud: &cloud,

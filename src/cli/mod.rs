@@ -20,6 +20,7 @@ mod import;
 mod list;
 mod measure;
 mod near;
+mod new;
 mod plot;
 mod predict;
 mod publish;
@@ -76,6 +77,7 @@ struct Options {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    New(Box<new::Args>),
     Render(render::Args),
     Radar(radar::Args),
     Calibrate(calibrate::Args),
@@ -113,6 +115,7 @@ pub fn run(cli: &Cli) -> Result<(), Error> {
     let console = Console { json: *json, quiet: *quiet, verbose: *verbose > 0 };
     let db = &Database::new(db.as_deref());
     match &cli.command {
+        Command::New(args) => new::run(args, &console),
         Command::Render(args) => render::run(args, db, &console),
         Command::Radar(args) => radar::run(args, &console),
         Command::Calibrate(args) => calibrate::run(args, db, &console),

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::cloud::ColumnArgs;
 use super::console::Console;
 use super::list::{FilterArgs, frequency};
 use super::summary::table;
@@ -29,6 +30,8 @@ pub(super) struct Args {
     /// A curve's CSV file, as `matdb measure` writes it
     #[arg(long, value_name = "FILE", group = "what")]
     curve: Option<PathBuf>,
+    #[command(flatten)]
+    columns: ColumnArgs,
     /// The longest curve of this material, NAME or NAME@REVISION
     #[arg(long, value_name = "NAME", group = "what")]
     material: Option<String>,
@@ -47,24 +50,31 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let store = db.read()?;
-    let search = search(args, store.as_ref())?;
+    let (search, notices) = search(args, store.as_ref())?;
+    notices.iter().for_each(|notice| console.notice(notice));
     let rank = if args.shape { Rank::Shape } else { Rank::Level };
+    if search.illumination.relative && !args.shape {
+        return Err(Error::usage(
+            "the levels of the curve are relative",
+            "rank by shape (--shape)",
+        ));
+    }
     let report = search.run(store.as_ref(), &args.filter.filter(), rank, args.limit)?;
     report.notices.iter().for_each(|notice| console.notice(notice));
     console.result(&text(&report, args), &report)
 }
 
-/// The curve that is asked about.
-fn search(args: &Args, store: Option<&Store>) -> Result<NeighbourSearch, Error> {
+/// The curve that is asked about, and what a person should know of its file.
+fn search(args: &Args, store: Option<&Store>) -> Result<(NeighbourSearch, Vec<String>), Error> {
     let frequency_hz = args.measured_at.map(|ghz| ghz * 1e9);
     let Some(path) = &args.curve else {
         let name = args.material.as_deref().unwrap_or_default();
-        return NeighbourSearch::of_material(name, frequency_hz, store);
+        return Ok((NeighbourSearch::of_material(name, frequency_hz, store)?, Vec::new()));
     };
-    let curve = Curve::read(&read_small(path)?)
+    let (curve, notices) = Curve::read_as(&read_small(path)?, &args.columns.names())
         .map_err(|error| Error::CurveFile { file: path.clone(), error })?;
     let Curve { observations, illumination } = curve;
-    Ok(NeighbourSearch { observations, illumination, frequency_hz, own: None })
+    Ok((NeighbourSearch { observations, illumination, frequency_hz, own: None }, notices))
 }
 
 fn text(record: &NeighbourReport, args: &Args) -> String {

@@ -7,6 +7,7 @@ use serde_json::json;
 use super::console::Console;
 use crate::error::Error;
 use crate::files::write_all;
+use crate::formats::words::significant;
 use crate::report::RadarReport;
 
 /// Show a radar: its scan, its spot and the polynomial of equation (1)
@@ -34,11 +35,12 @@ pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let names = files.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
     let [width_m, height_m] = field.sides_m();
     let text = format!(
-        "{}: {} chirps over {width_m:.3} m × {height_m:.3} m at 8 m\n\
+        "{}: {} chirps over {width_m:.3} m × {height_m:.3} m at {} m\n\
          f5 is off the exact mirror by {:.2e} mm at worst, {:.2e} mm rms, for R from {} to {} m\n\
          wrote {names} to {}\n",
         radar.preset,
         chirps.rays.len(),
+        significant(radar.frames().pattern_range_m, 3),
         f5_error.worst_mm,
         f5_error.rms_mm,
         domain.range_m[0],

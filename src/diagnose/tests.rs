@@ -69,8 +69,7 @@ fn chirps(radar: &Radar) -> crate::radar::Chirps {
         number: (0..count as u32).collect(),
         time_s: (0..count).map(|i| 2e-4 * i as f64).collect(),
         rays: (0..count).map(ray).collect(),
-        mirror: vec![],
-        notices: vec![],
+        ..Default::default()
     }
 }
 

@@ -11,7 +11,6 @@ use crate::effects::{Shot, Stage};
 use crate::frames::{Direction, Global, Point, Pose, Ray};
 use crate::measure::icp::point_to_point;
 use crate::radar::Radar;
-use crate::radar::scan::PATTERN_RANGE_M;
 
 /// Largest distance of a vertex from its place on the first scan's target, m: a sixteenth of the spot.
 const SAME_PLACE_M: f64 = 1e-3;
@@ -65,7 +64,7 @@ impl<'a> Views<'a> {
         let origin = first.chirps.rays.first().map_or(frames.origin(), |ray| ray.origin);
         let Some(direction) = origin.towards(point) else { return *shot };
         let ray = Ray { origin, direction };
-        let seen = Point::from(origin.xyz + PATTERN_RANGE_M * direction.xyz());
+        let seen = Point::from(origin.xyz + frames.pattern_range_m * direction.xyz());
         let place = (frames.global_from_target.inverse() * seen).xyz;
         let mut there = Shot { ray, xt_m: place.x, yt_m: place.y, target: Pose::NONE, ..*shot };
         there.hit.point = point;
@@ -108,6 +107,9 @@ fn is_same_instrument(a: &Radar, b: &Radar) -> bool {
     let there = Radar {
         primary_focus_m: b.primary_focus_m,
         alpha_deg: b.alpha_deg,
+        position_m: b.position_m,
+        look_at_m: b.look_at_m,
+        up: b.up,
         scan: b.scan.clone(),
         ..a.clone()
     };

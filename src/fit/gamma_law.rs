@@ -33,6 +33,14 @@ pub(crate) fn ln_lower_gamma(a: f64, x: f64) -> f64 {
     (-(ln_front.exp() * upper_fraction(a, x)).min(1.0)).ln_1p()
 }
 
+/// ln Q(a, x), Q = 1 − P, for a > 0; 0 for x ≤ 0.
+fn ln_upper_gamma(a: f64, x: f64) -> f64 {
+    if x < a + 1.0 {
+        return (-ln_lower_gamma(a, x).exp()).ln_1p();
+    }
+    a * x.ln() - x - ln_gamma(a) + upper_fraction(a, x).ln()
+}
+
 /// Keeps a divisor away from 0.
 fn guarded(z: f64) -> f64 {
     if z.abs() < f64::MIN_POSITIVE { f64::MIN_POSITIVE } else { z }
@@ -161,6 +169,37 @@ impl GammaLaw {
         sum.bend = sum.by_ln_mean.powi(2);
         sum
     }
+
+    /// ln probability that the power is at or above a limit.
+    pub fn above(&self, ln_limit: f64, ln_mean: f64) -> LnProbability {
+        /// Where nearly all powers stay below, their complement is computed by itself.
+        const MOST: f64 = 0.9;
+        let below = self.below(ln_limit, ln_mean);
+        let share = below.value.exp();
+        if share > MOST {
+            return above(self.looks, (ln_limit - ln_mean).clamp(-700.0, 700.0));
+        }
+        let odds = share / (1.0 - share);
+        let by_ln_mean = -odds * below.by_ln_mean;
+        LnProbability {
+            value: (-share).ln_1p(),
+            by_ln_mean,
+            by_ln_looks: -odds * below.by_ln_looks,
+            bend: by_ln_mean.powi(2),
+        }
+    }
+}
+
+/// ln of the probability of a power at or above the limit, and its derivatives; `ln_ratio` is ln(limit/mean).
+fn above(looks: f64, ln_ratio: f64) -> LnProbability {
+    let x = looks * ln_ratio.exp();
+    let value = ln_upper_gamma(looks, x);
+    // d Q/d ln x = −xᴸe⁻ˣ/Γ(L).
+    let ln_density = looks * x.ln() - x - ln_gamma(looks);
+    let by_ln_mean = (ln_density - value).exp();
+    let more = looks * LOOKS_STEP.exp();
+    let by_ln_looks = (ln_upper_gamma(more, more * ln_ratio.exp()) - value) / LOOKS_STEP;
+    LnProbability { value, by_ln_mean, by_ln_looks, bend: by_ln_mean.powi(2) }
 }
 
 /// The tabulated tail of the law of some looks.
@@ -216,6 +255,36 @@ mod tests {
             assert!((ln_lower_gamma(2.0, x) - two).abs() < 1e-11, "{x}");
         }
         assert_eq!(ln_lower_gamma(1.0, 0.0), f64::NEG_INFINITY);
+    }
+
+    #[test]
+    fn a_power_is_above_a_limit_or_below_it() {
+        for looks in [0.5, 1.0, 4.0, 50.0f64] {
+            let law = GammaLaw::new(looks);
+            for ln_limit in [-6.0, -1.0, -0.1, 0.3, 1.5, 4.0f64] {
+                let (above, below) = (law.above(ln_limit, 0.0), law.below(ln_limit, 0.0));
+                let sum = above.value.exp() + below.value.exp();
+                assert!((sum - 1.0).abs() < 1e-7, "{looks} {ln_limit}: {sum}");
+                if looks == 1.0 {
+                    assert!((above.value / -ln_limit.exp() - 1.0).abs() < 1e-6, "{ln_limit}");
+                    assert!((above.by_ln_mean / ln_limit.exp() - 1.0).abs() < 1e-5, "{ln_limit}");
+                }
+                const STEP: f64 = 1e-4;
+                let [more, less] = [STEP, -STEP].map(|step| law.above(ln_limit, step).value);
+                let slope = (more - less) / (2.0 * STEP);
+                assert!(
+                    (above.by_ln_mean - slope).abs() < 1e-3 * (1e-3 + slope.abs()),
+                    "{looks} {ln_limit}"
+                );
+                let [more, less] = [STEP, -STEP]
+                    .map(|step| GammaLaw::new(looks * step.exp()).above(ln_limit, 0.0).value);
+                let slope = (more - less) / (2.0 * STEP);
+                assert!(
+                    (above.by_ln_looks - slope).abs() < 1e-2 * (1e-2 + slope.abs()),
+                    "{looks} {ln_limit}"
+                );
+            }
+        }
     }
 
     #[test]

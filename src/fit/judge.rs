@@ -9,7 +9,8 @@ use super::uncertainty::Uncertainty;
 use super::verdict::Finding;
 use crate::brdf::{Brdf, Excess, ParameterError};
 use crate::formats::words::significant;
-use crate::material::{Estimate, Observation};
+use crate::material::{Estimate, Illumination, Observation};
+use crate::measure::Curve;
 
 /// Correlation from which two numbers are reported as hard to distinguish.
 const CORRELATED: f64 = 0.95;
@@ -21,12 +22,9 @@ const LEAST_ROWS: usize = 12;
 /// The split where the method has none, degrees.
 const SPLIT_DEG: f64 = 6.0;
 
-/// The findings on a fit to `rows`.
-pub(super) fn judge(
-    result: &FitResult,
-    found: &SearchResult,
-    rows: &[Observation],
-) -> Vec<Finding> {
+/// The findings on a fit to a curve.
+pub(super) fn judge(result: &FitResult, found: &SearchResult, curve: &Curve) -> Vec<Finding> {
+    let rows = curve.observations.as_slice();
     let range = result.model.validate();
     let mut findings = Vec::new();
     // Out of range k follows from the levels and was not chosen.
@@ -42,11 +40,18 @@ pub(super) fn judge(
         findings.push(Finding::StartsDisagree { agreeing, starts });
     }
     findings.extend(judge_rows(result, rows));
+    let Illumination { relative, only_detected, .. } = curve.illumination;
+    findings.extend(relative.then_some(Finding::Relative));
+    if only_detected && result.fit.method != Method::Censored {
+        findings.push(Finding::CutIgnored);
+    }
     findings.extend(judge_numbers(result, found));
     if let Some(beam_rad) = result.fit.beam_rad {
         judge_widths(result, found, beam_rad, &mut findings);
     }
-    findings.extend(judge_energy(result, rows));
+    if !relative {
+        findings.extend(judge_energy(result, rows));
+    }
     if let Err(ParameterError { path, value, .. }) = range {
         let value = significant(value, 4);
         let held = result.fit.fixed.iter().map(|(path, _)| path.clone()).collect();

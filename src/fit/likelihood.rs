@@ -2,7 +2,8 @@
 //!
 //! A detected power y has the density g(y; L, μ) of Gamma(L, μ/L), a chirp without a detection the
 //! probability G(T; L, μ) of staying below the threshold T. μ = σ⁰(t) + thermal noise, t the true
-//! angle. Each chirp has one unknown but fixed t, so the likelihood is averaged over t,
+//! angle. Where only detections were recorded, each is divided by the probability of passing its threshold, the mean
+//! of 1 − G over t. Each chirp has one unknown but fixed t, so the likelihood is averaged over t,
 //! p(y) = Σ_q w_q·g(y; L, μ(t_q)), not the mean: averaging μ would smear the lobe but leave each
 //! chirp the scatter of speckle alone. The curvature is the sum of the scores' outer products (Berndt,
 //! Hall, Hall & Hausman 1974).
@@ -51,6 +52,8 @@ struct Chirp {
     ln_sigma0: f64,
     noise: f64,
     censored: bool,
+    /// ln of the threshold of a detection that would not be there below it.
+    ln_limit: Option<f64>,
     nodes: Vec<Node>,
 }
 
@@ -102,7 +105,8 @@ impl<'a> Likelihood<'a> {
     ) -> Likelihood<'a> {
         let mut chirps: Vec<Chirp> =
             rows.iter().map(|row| Chirp::new(row, noise_w, angles)).collect();
-        let limits = chirps.iter().filter(|chirp| chirp.censored).map(|c| c.nodes.len()).sum();
+        let has_limit = |chirp: &&Chirp| chirp.censored || chirp.ln_limit.is_some();
+        let limits = chirps.iter().filter(has_limit).map(|c| c.nodes.len()).sum();
         let theta_rad: Vec<f64> =
             chirps.iter().flat_map(|c| &c.nodes).map(|n| n.theta_rad).collect();
         // A law at the angles of a short curve is cheaper than at all knots.
@@ -219,6 +223,7 @@ impl Chirp {
             ln_sigma0: sigma0.ln(),
             noise: noise_w * sigma0 / row.power_w.unwrap_or(sigma0),
             censored: row.is_censored(),
+            ln_limit: row.threshold_sigma0.filter(|_| !row.is_censored()).map(f64::ln),
             nodes: angles.into_iter().map(node).collect(),
         }
     }
@@ -228,9 +233,19 @@ impl Chirp {
         if self.noise > 0.0 { (ln_sigma0.exp() + self.noise).ln() } else { ln_sigma0 }
     }
 
-    /// ln of the probability of a lower power, averaged over the true angle.
+    /// ln of the probability of a lower power, averaged over the true angle; of one above the threshold, where only
+    /// detections were recorded.
     fn ln_below(&self, table: &Table, law: &GammaLaw) -> f64 {
-        self.averaged(table, |ln_mean| law.below(self.ln_sigma0, ln_mean).value)
+        let below = self.averaged(table, |ln_mean| law.below(self.ln_sigma0, ln_mean).value);
+        let Some(ln_limit) = self.ln_limit else { return below };
+        let silent = self.averaged(table, |ln_mean| law.below(ln_limit, ln_mean).value);
+        let between = below + (-(silent - below).min(0.0).exp()).ln_1p();
+        between - self.ln_above(table, law, ln_limit)
+    }
+
+    /// ln of the probability of passing a threshold, averaged over the true angle.
+    fn ln_above(&self, table: &Table, law: &GammaLaw, ln_limit: f64) -> f64 {
+        self.averaged(table, |ln_mean| law.above(ln_limit, ln_mean).value)
     }
 
     /// ln p of the chirp.
@@ -238,7 +253,8 @@ impl Chirp {
         if self.censored {
             return self.ln_below(table, law);
         }
-        self.averaged(table, |ln_mean| law.detected(self.ln_sigma0, ln_mean).value)
+        let own = self.averaged(table, |ln_mean| law.detected(self.ln_sigma0, ln_mean).value);
+        own - self.ln_limit.map_or(0.0, |ln_limit| self.ln_above(table, law, ln_limit))
     }
 
     /// ln of a probability, known by its logarithm for each ln of the mean, averaged over the true angle.
@@ -255,16 +271,36 @@ impl Chirp {
 
     /// ln p of the chirp; its derivatives are left in `scratch.score`.
     fn score(&self, tables: &Tables, scratch: &mut Scratch) -> f64 {
+        scratch.score.fill(0.0);
+        let own = |ln_mean| {
+            if self.censored {
+                tables.law.below(self.ln_sigma0, ln_mean)
+            } else {
+                tables.law.detected(self.ln_sigma0, ln_mean)
+            }
+        };
+        let above = self.ln_limit.map_or(0.0, |ln_limit| {
+            self.add_score(tables, scratch, -1.0, |ln_mean| tables.law.above(ln_limit, ln_mean))
+        });
+        // Last, since the curvature is that of the law itself.
+        self.add_score(tables, scratch, 1.0, own) - above
+    }
+
+    /// ln of a probability, averaged over the true angle; its derivatives, times a factor, are added to
+    /// `scratch.score`, and `scratch.gradient` and `scratch.bend` become its own.
+    fn add_score(
+        &self,
+        tables: &Tables,
+        scratch: &mut Scratch,
+        factor: f64,
+        ln_p: impl Fn(f64) -> LnProbability,
+    ) -> f64 {
         let Scratch { terms, laws, score, gradient, bend } = scratch;
         terms.clear();
         laws.clear();
         for Node { place, ln_weight, .. } in &self.nodes {
             let ln_mean = self.ln_mean(&tables.ln_sigma0, place);
-            let law = if self.censored {
-                tables.law.below(self.ln_sigma0, ln_mean)
-            } else {
-                tables.law.detected(self.ln_sigma0, ln_mean)
-            };
+            let law = ln_p(ln_mean);
             terms.push(ln_weight + law.value);
             // The share of σ⁰ in the mean, the rest being noise.
             let share = if self.noise > 0.0 { 1.0 - self.noise / ln_mean.exp() } else { 1.0 };
@@ -273,7 +309,6 @@ impl Chirp {
         let largest = terms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         terms.iter_mut().for_each(|term| *term = (*term - largest).exp());
         let sum: f64 = terms.iter().sum();
-        score.fill(0.0);
         gradient.fill(0.0);
         *bend = 0.0;
         for ((Node { place, .. }, term), (law, share)) in self.nodes.iter().zip(&*terms).zip(&*laws)
@@ -285,12 +320,12 @@ impl Chirp {
             *bend += weight * law.bend;
             for (index, table) in tables.by_unknown.iter().enumerate() {
                 let Some(table) = table else {
-                    score[index] += weight * law.by_ln_looks;
+                    score[index] += factor * weight * law.by_ln_looks;
                     continue;
                 };
                 let slope = weight * share * table.at(place);
                 gradient[index] += slope;
-                score[index] += law.by_ln_mean * slope;
+                score[index] += factor * law.by_ln_mean * slope;
             }
         }
         largest + sum.ln()
@@ -310,13 +345,17 @@ fn ln_sum(terms: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::fit::twin::{Twin, mixture};
+    use crate::measure::Curve;
 
     #[test]
     fn the_gradient_is_that_of_the_value() {
         let start = mixture(0.06, 4.0, 0.04, 0.003);
         let coordinates = Coordinates::new(&start, &[], &[], None).unwrap();
-        for noise_w in [0.0, 1e-11] {
-            let curve = Twin { rows: 200, ..Twin::default() }.curve(1);
+        let twin = Twin { rows: 200, ..Twin::default() };
+        let curves = [twin.curve(1), twin.only_detected(1)];
+        for (noise_w, curve) in
+            [0.0, 1e-11].into_iter().flat_map(|w| curves.each_ref().map(|c| (w, c)))
+        {
             let likelihood = Likelihood::new(&coordinates, &curve.observations, noise_w);
             let at = coordinates.start();
             let local = likelihood.local(Curvature::Scores, &at);
@@ -335,15 +374,24 @@ mod tests {
 
     #[test]
     fn rows_below_their_own_power_are_uniform_under_the_truth() {
-        let twin = Twin { rows: 2000, threshold_dbm: -300.0, ..Twin::default() };
-        let curve = twin.curve(2);
+        let all = Twin { rows: 2000, threshold_dbm: -300.0, ..Twin::default() };
+        check_uniform(&all, &all.curve(2));
+        // A third of the chirps is silent, and not recorded.
+        let cut = Twin { rows: 3000, threshold_dbm: -72.0, ..Twin::default() };
+        let curve = cut.only_detected(2);
+        assert!((1500..2300).contains(&curve.observations.len()), "{}", curve.observations.len());
+        check_uniform(&cut, &curve);
+    }
+
+    fn check_uniform(twin: &Twin, curve: &Curve) {
+        let count = curve.observations.len() as f64;
         let coordinates = Coordinates::new(&twin.model, &[], &[], Some(twin.looks)).unwrap();
         let likelihood = Likelihood::new(&coordinates, &curve.observations, 0.0);
         let mut shares: Vec<f64> =
             likelihood.ln_below(&coordinates.start()).into_iter().map(f64::exp).collect();
         shares.sort_by(f64::total_cmp);
-        let gap = shares.iter().enumerate().map(|(i, u)| (u - (i as f64 + 0.5) / 2000.0).abs());
+        let gap = shares.iter().enumerate().map(|(i, u)| (u - (i as f64 + 0.5) / count).abs());
         // Kolmogorov: 1.95/√n is passed once in a thousand.
-        assert!(gap.fold(0.0, f64::max) < 1.95 / 2000f64.sqrt());
+        assert!(gap.fold(0.0, f64::max) < 1.95 / count.sqrt());
     }
 }

@@ -289,6 +289,35 @@ mod tests {
     }
 
     #[test]
+    fn detections_alone_give_the_truth_where_their_thresholds_are_known() {
+        let twin = Twin { rows: 3000, threshold_dbm: -72.0, ..Twin::default() };
+        let curve = twin.only_detected(5);
+        let fit = Fit { looks: Some(1.0), ..quick() };
+        let found = fit.run(&start(), &curve).unwrap();
+        let cut = Curve {
+            observations: curve
+                .detected()
+                .map(|row| Observation { threshold_sigma0: None, ..*row })
+                .collect(),
+            ..Curve::default()
+        };
+        let fooled = fit.run(&start(), &cut).unwrap();
+        for (name, truth) in
+            [(SPECULAR_LEVEL, 0.05), (DIFFUSE_LEVEL, 0.0016), ("diffuse.alpha", 6.0)]
+        {
+            let off = |of: &FitResult| {
+                let estimate = of.estimate(name).unwrap();
+                (estimate.value - truth).abs() / estimate.sd.unwrap()
+            };
+            assert!(off(&found) < 4.0, "{name}: {found:?}");
+            assert!(name != DIFFUSE_LEVEL || off(&fooled) > 10.0, "{name}: {fooled:?}");
+        }
+        let least = Fit { method: Method::Mse { split_rad: 0.1 }, ..quick() };
+        let said = least.run(&start(), &curve).unwrap().verdict;
+        assert!(said.contains(&Finding::CutIgnored), "{said:?}");
+    }
+
+    #[test]
     fn looks_are_estimated_beside_the_model() {
         let twin = Twin { looks: 4.0, ..Twin::default() };
         let found = quick().run(&start(), &twin.curve(2)).unwrap();

@@ -44,7 +44,7 @@ pub(super) fn summarise(
         coordinates,
         at,
     };
-    result.verdict = judge(&result, found, &curve.observations);
+    result.verdict = judge(&result, found, curve);
     result
 }
 
@@ -109,6 +109,10 @@ fn data_hash(rows: &[Observation]) -> String {
         }
         hasher.update(&row.chirp.unwrap_or(index).to_le_bytes());
         hasher.update(&[u8::from(row.is_censored())]);
+        // Only where a detection would not be there below it, so that hashes of before stay.
+        if let Some(limit) = row.threshold_sigma0.filter(|_| !row.is_censored()) {
+            hasher.update(&limit.to_le_bytes());
+        }
     }
     hasher.finalize().to_hex().to_string()
 }

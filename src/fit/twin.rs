@@ -58,6 +58,19 @@ impl Twin {
         Curve { observations, ..Curve::default() }
     }
 
+    /// The same of which only the detections were recorded, each with its threshold.
+    pub fn only_detected(&self, seed: u64) -> Curve {
+        let threshold_w = watts_from_dbm(self.threshold_dbm);
+        let mut curve = self.curve(seed);
+        curve.illumination.only_detected = true;
+        curve.observations.retain(|row| !row.is_censored());
+        for row in &mut curve.observations {
+            let ratio = row.sigma0.zip(row.power_w).map(|(sigma0, power_w)| sigma0 / power_w);
+            row.threshold_sigma0 = ratio.map(|ratio| ratio * threshold_w);
+        }
+        curve
+    }
+
     fn row(&self, seed: u64, chirp: u32) -> Observation {
         let key = Key { seed, chirp: u64::from(chirp), sub_ray: 0, purpose: Purpose::Speckle };
         let mut draws = key.draws();

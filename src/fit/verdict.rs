@@ -46,6 +46,10 @@ pub enum Finding {
         /// Number of rows.
         rows: usize,
     },
+    /// Only detections were recorded, which the method does not know.
+    CutIgnored,
+    /// The levels of the curve are known up to a common factor only.
+    Relative,
     /// A number stopped at a bound of its range.
     AtBound {
         /// Its name.
@@ -170,6 +174,16 @@ impl fmt::Display for Finding {
                 f,
                 "{censored} of {rows} rows are below the threshold and least squares ignores them, which \
                  flattens the tail; and it takes the mean of decibels, which speckle pulls down"
+            ),
+            Finding::CutIgnored => write!(
+                f,
+                "only detections were recorded, and least squares takes the cut at the threshold for the surface's law; \
+                 use the method censored"
+            ),
+            Finding::Relative => write!(
+                f,
+                "the levels are relative: R, S and every other level count in an unknown unit; their ratios, widths and \
+                 exponents are the surface's"
             ),
             Finding::AtBound { name, value } => {
                 write!(f, "{name} stopped at its bound {}", significant(*value, 5))

@@ -1,5 +1,12 @@
-//! CSV tables with a header, and errors that name the line and the column.
+//! Tables of text with a header, in one dialect, and errors that name the line and the column.
+//!
+//! Cells are separated by what the header line has most of: commas, semicolons or tabs; blanks where it has none of
+//! these. Where commas do not separate, one comma in a number is its decimal sign, as in `-3,5`. A byte order mark and
+//! lines of `#` or `//` at the head are passed over.
 
+use csv::StringRecord;
+
+use super::columns::{ColumnNames, passed_over, twice};
 use super::error::FormatError;
 
 /// A table of text cells under named columns.
@@ -7,13 +14,21 @@ use super::error::FormatError;
 pub struct Table {
     columns: Vec<String>,
     rows: Vec<Row>,
+    separator: Separator,
 }
 
 /// One line of a [`Table`].
 #[derive(Clone, Debug, PartialEq)]
 struct Row {
     line: u64,
-    cells: Vec<String>,
+    cells: StringRecord,
+}
+
+/// What stands between two cells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Separator {
+    Byte(u8),
+    Blanks,
 }
 
 /// A cell with its place, for errors.
@@ -25,24 +40,115 @@ pub struct Cell<'a> {
     pub column: &'a str,
     /// The text, trimmed.
     pub text: &'a str,
+    /// Whether a comma may be the decimal sign.
+    has_decimal_commas: bool,
+}
+
+/// Whether the first line has the names of the columns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Names {
+    /// It has.
+    InFirstLine,
+    /// It has, unless there is a number in it; the columns are then called 1, 2, 3 ….
+    WhereTheyAre,
 }
 
 impl Table {
     /// Reads a table whose header holds all of `required` and nothing beyond those and `optional`.
+    ///
+    /// # Errors
+    /// What the header lacks or has too much; the line that is not like the header.
     pub fn read(bytes: &[u8], required: &[&str], optional: &[&str]) -> Result<Table, FormatError> {
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
-        let header = reader.headers().map_err(malformed)?.clone();
-        let columns: Vec<String> = header.iter().map(str::to_owned).collect();
-        check_header(&columns, required, optional)?;
-        let rows = reader
-            .records()
-            .map(|record| {
-                let record = record.map_err(malformed)?;
-                let line = record.position().map_or(0, csv::Position::line);
-                Ok(Row { line, cells: record.iter().map(str::to_owned).collect() })
-            })
-            .collect::<Result<_, FormatError>>()?;
-        Ok(Table { columns, rows })
+        let table = Table::parse(bytes, Names::InFirstLine)?;
+        table.check(required)?;
+        let known: Vec<&str> = required.iter().chain(optional).copied().collect();
+        match table.unknown(&known).first() {
+            None => Ok(table),
+            Some(unknown) => Err(FormatError::at(
+                "the header",
+                format!("unknown column `{unknown}`"),
+                format!("the columns are {}", known.join(", ")),
+            )),
+        }
+    }
+
+    /// Reads a table of any columns.
+    ///
+    /// # Errors
+    /// The line that is not like the header.
+    pub fn parse(bytes: &[u8], names: Names) -> Result<Table, FormatError> {
+        let bytes = without_head(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
+        let separator = Separator::of(&bytes);
+        let mut rows = separator.rows(&bytes)?.into_iter().peekable();
+        let first = rows.peek().map(|row| row.cells.clone()).unwrap_or_default();
+        let has_decimal_commas = separator.has_decimal_commas();
+        // NaN is no name, either.
+        let has_numbers = first.iter().any(|text| parse(text, has_decimal_commas).is_some());
+        let columns = if has_numbers && names == Names::WhereTheyAre {
+            (1..=first.len()).map(|number| number.to_string()).collect()
+        } else {
+            rows.next();
+            first.iter().map(str::to_owned).collect()
+        };
+        let table = Table { columns, rows: rows.collect(), separator };
+        table.rows.iter().try_for_each(|row| table.check_length(row))?;
+        Ok(table)
+    }
+
+    fn check_length(&self, Row { line, cells }: &Row) -> Result<(), FormatError> {
+        if cells.len() == self.columns.len() {
+            return Ok(());
+        }
+        let problem = format!("{} cells under a header of {}", cells.len(), self.columns.len());
+        Err(FormatError::at(format!("line {line}"), problem, "mend the line"))
+    }
+
+    /// Gives columns the names by which they are asked for.
+    ///
+    /// # Errors
+    /// Names of no column, or of several.
+    pub fn rename(&mut self, names: &ColumnNames) -> Result<(), FormatError> {
+        names.apply(&mut self.columns)
+    }
+
+    /// Writes the names of all columns in lower case.
+    pub fn lower_case(&mut self) {
+        self.columns.iter_mut().for_each(|column| column.make_ascii_lowercase());
+    }
+
+    /// Refuses a table that lacks a required column or has one name twice.
+    ///
+    /// # Errors
+    /// Which column it is.
+    pub fn check(&self, required: &[&str]) -> Result<(), FormatError> {
+        let problem = if let Some(missing) = required.iter().find(|name| !self.has(name)) {
+            format!("there is no column `{missing}`")
+        } else if let Some(name) = twice(&self.columns) {
+            format!("column `{name}` is there twice")
+        } else {
+            return Ok(());
+        };
+        let way_out = format!(
+            "the columns are {}; give another its name by --columns THEIRS=OURS",
+            self.columns.join(", ")
+        );
+        Err(FormatError::at("the header", problem, way_out))
+    }
+
+    /// The named columns that are not among those.
+    pub fn unknown(&self, known: &[&str]) -> Vec<&str> {
+        let columns = self.columns.iter().map(String::as_str);
+        columns.filter(|column| !column.is_empty() && !known.contains(column)).collect()
+    }
+
+    /// A sentence on the columns that are not among those.
+    pub fn passed_over(&self, known: &[&str]) -> Option<String> {
+        passed_over(&self.unknown(known), known)
+    }
+
+    /// Names of the columns, in the file's order.
+    pub fn columns(&self) -> impl Iterator<Item = &str> {
+        self.columns.iter().map(String::as_str)
     }
 
     /// Number of rows below the header.
@@ -59,8 +165,9 @@ impl Table {
     pub fn cell<'a>(&'a self, row: usize, column: &'a str) -> Option<Cell<'a>> {
         let index = self.columns.iter().position(|c| c == column)?;
         let row = self.rows.get(row)?;
-        let text = row.cells.get(index)?.as_str();
-        (!text.is_empty()).then_some(Cell { line: row.line, column, text })
+        let text = row.cells.get(index)?;
+        let has_decimal_commas = self.separator.has_decimal_commas();
+        (!text.is_empty()).then_some(Cell { line: row.line, column, text, has_decimal_commas })
     }
 
     /// A finite number; `None` where the cell is absent or empty.
@@ -97,6 +204,17 @@ impl Table {
         }
     }
 
+    /// A number from the least to the greatest that must be there.
+    pub fn required_within(
+        &self,
+        row: usize,
+        column: &str,
+        range: (f64, f64),
+    ) -> Result<f64, FormatError> {
+        let value = self.required_number(row, column)?;
+        Ok(self.number_within(row, column, range)?.unwrap_or(value))
+    }
+
     /// A whole number of 32 bits that must be there.
     pub fn whole_number(&self, row: usize, column: &str) -> Result<u32, FormatError> {
         let value = self.required_number(row, column)?;
@@ -121,8 +239,9 @@ impl Table {
 impl Cell<'_> {
     /// The cell as a finite number.
     pub fn number(&self) -> Result<f64, FormatError> {
-        let value: f64 = self.text.parse().unwrap_or(f64::NAN);
-        if value.is_finite() { Ok(value) } else { Err(self.refuse("fill in a finite number")) }
+        parse(self.text, self.has_decimal_commas)
+            .filter(|number| number.is_finite())
+            .ok_or_else(|| self.refuse("fill in a finite number"))
     }
 
     /// An error that shows the cell and its place.
@@ -135,54 +254,91 @@ impl Cell<'_> {
     }
 }
 
-/// Refuses a header that lacks a required column, or holds an unknown one or one twice.
-fn check_header(
-    columns: &[String],
-    required: &[&str],
-    optional: &[&str],
-) -> Result<(), FormatError> {
-    for (mark, name) in [(';', "semicolons"), ('\t', "tabs")] {
-        if required.len() > 1 && matches!(columns, [only] if only.contains(mark)) {
-            let problem = format!("the cells are separated by {name}");
-            return Err(FormatError::at(
-                "line 1",
-                problem,
-                "separate them with commas, and write numbers with a point, as in -3.5",
-            ));
+/// A number, NaN and infinity among them.
+fn parse(text: &str, has_decimal_commas: bool) -> Option<f64> {
+    match text.split_once(',') {
+        Some((whole, part)) if has_decimal_commas && !text.contains('.') => {
+            format!("{whole}.{part}").parse().ok()
+        }
+        _ => text.parse().ok(),
+    }
+}
+
+impl Separator {
+    /// What the first line has most of.
+    fn of(bytes: &[u8]) -> Separator {
+        let lines = bytes.split(|byte| *byte == b'\n');
+        let first = lines.map(<[u8]>::trim_ascii).find(|line| !line.is_empty()).unwrap_or(b"");
+        let mut is_quoted = false;
+        let mut counts = [(b',', 0), (b';', 0), (b'\t', 0)];
+        for byte in first {
+            is_quoted ^= *byte == b'"';
+            let counted = counts.iter_mut().filter(|(mark, _)| !is_quoted && mark == byte);
+            counted.for_each(|(_, count)| *count += 1);
+        }
+        // The first of equals is the last that `max_by_key` sees.
+        match counts.iter().rev().max_by_key(|(_, count)| *count) {
+            Some(&(mark, 1..)) => Separator::Byte(mark),
+            _ if first.contains(&b' ') => Separator::Blanks,
+            _ => Separator::Byte(b','),
         }
     }
-    let known: Vec<&str> = required.iter().chain(optional).copied().collect();
-    let problem = if let Some(missing) = required.iter().find(|r| !columns.iter().any(|c| c == *r))
-    {
-        format!("there is no column `{missing}`")
-    } else if let Some(unknown) = columns.iter().find(|c| !known.contains(&c.as_str())) {
-        format!("unknown column `{unknown}`")
-    } else if let Some(at) = (1..columns.len()).find(|&at| columns[..at].contains(&columns[at])) {
-        format!("column `{}` is there twice", columns[at])
-    } else {
-        return Ok(());
-    };
-    Err(FormatError::at("line 1", problem, format!("the columns are {}", known.join(", "))))
+
+    fn has_decimal_commas(self) -> bool {
+        self != Separator::Byte(b',')
+    }
+
+    fn rows(self, bytes: &[u8]) -> Result<Vec<Row>, FormatError> {
+        match self {
+            Separator::Blanks => rows_of_words(bytes),
+            Separator::Byte(mark) => {
+                let mut reader = csv::ReaderBuilder::new()
+                    .delimiter(mark)
+                    .trim(csv::Trim::All)
+                    .has_headers(false)
+                    .flexible(true)
+                    .from_reader(bytes);
+                let rows = reader.records().map(|record| {
+                    let cells = record.map_err(malformed)?;
+                    let line = cells.position().map_or(0, csv::Position::line);
+                    Ok(Row { line, cells })
+                });
+                rows.collect()
+            }
+        }
+    }
+}
+
+fn rows_of_words(bytes: &[u8]) -> Result<Vec<Row>, FormatError> {
+    let mut rows = Vec::new();
+    for (line, bytes) in (1..).zip(bytes.split(|byte| *byte == b'\n')) {
+        let text = std::str::from_utf8(bytes).map_err(|_| {
+            FormatError::at(format!("line {line}"), "the text is not UTF-8", "mend the line")
+        })?;
+        let cells = StringRecord::from_iter(text.split_whitespace());
+        if !cells.is_empty() {
+            rows.push(Row { line, cells });
+        }
+    }
+    Ok(rows)
 }
 
 fn malformed(error: csv::Error) -> FormatError {
     let line = error.position().map_or(1, csv::Position::line);
     let problem = match error.kind() {
-        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
-            format!("{len} cells under a header of {expected_len}")
-        }
-        csv::ErrorKind::Utf8 { .. } => "the text is not UTF-8".to_owned(),
-        _ => "the text is not CSV".to_owned(),
+        csv::ErrorKind::Utf8 { .. } => "the text is not UTF-8",
+        _ => "the text is not CSV",
     };
     FormatError::at(format!("line {line}"), problem, "mend the line")
 }
 
 /// The bytes with the comment lines at the head emptied, so that the other lines keep their numbers.
-pub fn without_head(bytes: &[u8]) -> Vec<u8> {
+fn without_head(bytes: &[u8]) -> Vec<u8> {
     let mut kept = Vec::with_capacity(bytes.len());
     let mut is_head = true;
     for line in bytes.split_inclusive(|byte| *byte == b'\n') {
-        is_head &= line.starts_with(b"#") || line.trim_ascii().is_empty();
+        let text = line.trim_ascii();
+        is_head &= text.is_empty() || text.starts_with(b"#") || text.starts_with(b"//");
         kept.extend_from_slice(if is_head { b"\n" } else { line });
     }
     kept
@@ -209,14 +365,38 @@ mod tests {
     fn errors_name_line_and_column() {
         let message = |text: &str| read(text).unwrap_err().to_string();
         assert!(message("sigma0_db\n1").contains("no column `theta_deg`"));
-        let table = Table::read(b"theta_deg;sigma0_db\n1;-3,5\n", &["theta_deg", "sigma0_db"], &[]);
-        let refused = table.unwrap_err().to_string();
-        assert!(refused.starts_with("line 1: the cells are separated by semicolons;"), "{refused}");
         assert!(message("theta_deg,x\n1,2").contains("unknown column `x`"));
         assert!(message("theta_deg,theta_deg\n1,2").contains("twice"));
         assert!(message("theta_deg\n1\n2,3\n").starts_with("line 3: 2 cells"));
         let table = read("theta_deg\n1\nnan\n").unwrap();
         let refused = table.required_number(1, "theta_deg").unwrap_err().to_string();
         assert!(refused.starts_with("line 3, column theta_deg: `nan`"), "{refused}");
+    }
+    #[test]
+    fn cells_are_separated_by_what_the_header_has() {
+        for text in [
+            "theta_deg,sigma0_db\n10,-3.5\n",
+            "theta_deg;sigma0_db\r\n10;-3,5\r\n",
+            "\u{feff}# ours\ntheta_deg\tsigma0_db\n10\t-3,5\n",
+            "// theirs\ntheta_deg  sigma0_db\n 10   -3.5\n",
+        ] {
+            let table = read(text).unwrap();
+            assert_eq!(table.required_number(0, "theta_deg").unwrap(), 10.0, "{text}");
+            assert_eq!(table.number(0, "sigma0_db").unwrap(), Some(-3.5), "{text}");
+        }
+        let twice = read("theta_deg;sigma0_db\n10;-3,5,1\n").unwrap();
+        assert!(twice.number(0, "sigma0_db").is_err());
+        let commas = read("theta_deg,sigma0_db\n10,\"-3,5\"\n").unwrap();
+        assert!(commas.number(0, "sigma0_db").is_err(), "may be thousands");
+    }
+
+    #[test]
+    fn a_table_of_numbers_may_lack_names() {
+        let numbers = b"1 2 3\n4 5 6\n";
+        let table = Table::parse(numbers, Names::WhereTheyAre).unwrap();
+        assert_eq!((table.len(), table.required_number(1, "3").unwrap()), (2, 6.0));
+        assert_eq!(Table::parse(numbers, Names::InFirstLine).unwrap().len(), 1);
+        let named = Table::parse(b"X Y Z\n4 5 6\n", Names::WhereTheyAre).unwrap();
+        assert_eq!(named.columns().collect::<Vec<_>>(), ["X", "Y", "Z"]);
     }
 }

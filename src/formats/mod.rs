@@ -4,21 +4,26 @@
 //! [`FormatError`] that says where and how to mend it. No reader allocates more than a small
 //! multiple of the bytes it was given, whatever a header claims.
 
+pub mod columns;
 pub mod csv;
 pub mod effect;
 mod error;
 pub mod exr;
 pub mod figure;
+mod guard;
 pub mod html;
 mod line;
 mod mesh_format;
 pub mod npy;
 pub mod obj;
 pub mod ply;
+pub mod points;
 pub mod stl;
 pub mod text;
 pub mod words;
 
+pub use columns::ColumnNames;
 pub use effect::EffectEntry;
 pub use error::FormatError;
 pub use mesh_format::MeshFormat;
+pub use points::{PointFormat, PointTable};

@@ -76,6 +76,11 @@ impl Material {
         if curve.observations.is_empty() {
             return Err(value(&place, "has no observation", "give it at least one row"));
         }
+        let has_thresholds = curve.observations.iter().all(|row| row.threshold_sigma0.is_some());
+        if curve.illumination.only_detected && !has_thresholds {
+            let problem = "holds only detections, and one of them has no threshold";
+            return Err(value(&place, problem, "fill in threshold_db in every row"));
+        }
         for (row, observation) in curve.observations.iter().enumerate() {
             observation.validate(&format!("{place}, observation {}", row + 1))?;
         }

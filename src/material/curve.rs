@@ -26,8 +26,8 @@ pub struct Curve {
     pub observations: Vec<Observation>,
 }
 
-/// How a target was lit while a curve was measured, as far as that is stated: what its levels and the widths of its
-/// lobes depend on besides the surface.
+/// How a target was lit and seen while a curve was measured, as far as that is stated: what its levels, its silence and
+/// the widths of its lobes depend on besides the surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Illumination {
     /// The form of the footprint with which powers became σ⁰.
@@ -38,6 +38,17 @@ pub struct Illumination {
     /// √(δ_w² + (w²/4)·(H + 1/R_c)²) on one of the curvature H, with δ_w = λ/(2π·w) of the spot's radius w.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub beam_rad: Option<f64>,
+    /// Whether the levels are known up to a common factor only.
+    #[serde(default, skip_serializing_if = "is_off")]
+    pub relative: bool,
+    /// Whether only detections were recorded: which chirps were silent is not known. Each detection then has its threshold.
+    #[serde(default, skip_serializing_if = "is_off")]
+    pub only_detected: bool,
+}
+
+/// What serde leaves out.
+fn is_off(on: &bool) -> bool {
+    !*on
 }
 
 impl Illumination {
@@ -55,10 +66,13 @@ impl Illumination {
         let both = Illumination {
             footprint: self.footprint.or(other.footprint),
             beam_rad: self.beam_rad.or(other.beam_rad),
+            relative: self.relative || other.relative,
+            only_detected: self.only_detected || other.only_detected,
         };
         let other_first = Illumination {
             footprint: other.footprint.or(self.footprint),
             beam_rad: other.beam_rad.or(self.beam_rad),
+            ..both
         };
         (both == other_first).then_some(both)
     }
@@ -69,7 +83,14 @@ impl Illumination {
         // A thousandth of the narrowest beam of a radar.
         let beam = self.beam_rad.map(|beam_rad| format!("{beam_rad:.6}"));
         let mut columns = [String::new(), String::new()];
-        for (name, value) in [("footprint", footprint), ("beam_rad", beam)] {
+        let [relative, only_detected] =
+            [self.relative, self.only_detected].map(|on| on.then(|| "1".to_owned()));
+        for (name, value) in [
+            ("footprint", footprint),
+            ("beam_rad", beam),
+            ("relative", relative),
+            ("only_detected", only_detected),
+        ] {
             if let Some(value) = value {
                 columns[0] += &format!(",{name}");
                 columns[1] += &format!(",{value}");

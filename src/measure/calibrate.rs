@@ -24,7 +24,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::cloud::Cloud;
 use super::error::{CalibrationError, ReductionError};
-use super::point_rays::rays_to_points;
+use super::point_rays::PointRays;
 use super::reduce::check_threshold;
 use crate::frames::{Global, Ray};
 use crate::radar::reference::{corner_return, plate_return, sphere_return};
@@ -113,7 +113,8 @@ impl Calibration {
         chirps: &Chirps,
         cloud: &Cloud,
     ) -> Result<CalibrationResult, CalibrationError> {
-        let rays = rays_to_points(cloud, radar, chirps).map_err(ReductionError::from)?;
+        let PointRays { rays, .. } =
+            PointRays::of(cloud, radar, chirps).map_err(ReductionError::from)?;
         check_threshold(radar, cloud)?;
         let beams = Beam::new(radar);
         let shots: Vec<Shot> = std::iter::zip(cloud.points(), &rays)

@@ -11,6 +11,7 @@ use thiserror::Error;
 
 use crate::formats::FormatError;
 use crate::frames::{Global, Point};
+use crate::material::Scale;
 use crate::render::Echo;
 use crate::units::{dbm_from_watts, rounded, shown, watts_from_dbm};
 
@@ -44,6 +45,8 @@ impl From<&Echo> for CloudPoint {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cloud {
     points: Vec<CloudPoint>,
+    /// Whether the powers are known, or only up to a common factor.
+    pub scale: Scale,
     /// Notices for the user.
     pub notices: Vec<String>,
 }
@@ -118,13 +121,39 @@ pub enum CloudError {
         second: usize,
     },
     /// The header of a cloud file lacks a column.
-    #[error("the file has no column {column}; it has: {found}")]
+    #[error(
+        "the file has no column {column}; it has: {found}; say which it is by --columns THEIRS={column}"
+    )]
     MissingColumn {
         /// The column that is missing.
-        column: &'static str,
+        column: String,
         /// The columns of the file.
         found: String,
     },
+    /// Powers in two units.
+    #[error("the file has both {first} and {second}; pass one over, as by --columns {second}=-")]
+    TwoPowers {
+        /// A column of powers.
+        first: &'static str,
+        /// Another.
+        second: &'static str,
+    },
+    /// Counts that are no power.
+    #[error(
+        "point {point} has {counts} counts, which is no power; leave out what was not detected, or give --power relative \
+         where these are decibels"
+    )]
+    NoCounts {
+        /// Point, from 0.
+        point: usize,
+        /// Its counts.
+        counts: f64,
+    },
+    /// Powers that are known up to a common factor only.
+    #[error(
+        "the powers are relative, and this needs dBm or watts; `matdb measure` takes relative ones"
+    )]
+    Relative,
     /// A chirp number that is not a whole number from 0.
     #[error("point {point} has the chirp number {value}; give a whole number, 0 or greater")]
     BadChirp {
@@ -136,7 +165,7 @@ pub enum CloudError {
 }
 
 impl Cloud {
-    /// A cloud from its points.
+    /// A cloud from its points, of known powers.
     ///
     /// # Errors
     /// When there is no point, a number is not finite, the size or the powers betray a wrong unit,
@@ -158,7 +187,7 @@ impl Cloud {
                 points.len()
             ));
         }
-        Ok(Cloud { points, notices })
+        Ok(Cloud { points, scale: Scale::Absolute, notices })
     }
 
     /// The detections, at least one, all finite.

@@ -1,33 +1,22 @@
-//! Cloud files: PLY, CSV and plain text. Frame and units are stated, never guessed.
+//! Cloud files, of any of the [formats of points](crate::formats::points). Frame and units are stated, never guessed.
 //!
-//! | format | columns |
+//! | columns | |
 //! |---|---|
-//! | PLY | `x y z`, one of `power_dbm`, `power_w`, `power`; `chirp` and `range_m` if there; others are passed over |
-//! | CSV | `x_m,y_m,z_m`, one of `power_dbm`, `power_w`; `chirp` and `range_m` if there |
-//! | XYZ | x, y, z and power, separated by blanks; lines with `#` are passed over |
+//! | `x_m y_m z_m`, `x_mm y_mm z_mm`, or `x y z` in the unit of [`CloudReading::metres_per_unit`] | place |
+//! | one of `power_dbm`, `power_w`, `power_db` (relative), `power_counts` (relative), or `power` in the unit of [`CloudReading::power`] | power |
+//! | `chirp` | number of the chirp, if known |
+//! | `range_m`, `range_mm` or `range` | range, if known |
 //!
-//! A column's name states its unit. What has no name, `power` of a PLY file and the fourth column of
-//! plain text, is in [`CloudReading::power`].
+//! Upper and lower case are the same. [`CloudReading::columns`] gives other people's columns these names; further
+//! columns are passed over with a notice.
 
 use glam::DVec3;
 
 use super::cloud::{Cloud, CloudError, CloudPoint, POSSIBLE_DBM};
-use crate::formats::FormatError;
-use crate::formats::csv;
-use crate::formats::ply::{self, read_table};
+use crate::formats::{ColumnNames, PointFormat, PointTable};
 use crate::frames::{Global, Point, Pose, Target};
+use crate::material::Scale;
 use crate::units::watts_from_dbm;
-
-/// The formats of cloud files.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CloudFormat {
-    /// Stanford polygons.
-    Ply,
-    /// Comma-separated values under a header.
-    Csv,
-    /// Four numbers on a line.
-    Xyz,
-}
 
 /// The unit of a power without a unit in its name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -37,52 +26,85 @@ pub enum PowerUnit {
     Dbm,
     /// Watts.
     Watt,
+    /// Decibels over a power that is not known.
+    RelativeDb,
+    /// Counts: powers over one that is not known.
+    Counts,
+}
+
+impl PowerUnit {
+    /// Whether the levels are known up to a common factor only.
+    fn scale(self) -> Scale {
+        match self {
+            PowerUnit::Dbm | PowerUnit::Watt => Scale::Absolute,
+            PowerUnit::RelativeDb | PowerUnit::Counts => Scale::Relative,
+        }
+    }
+
+    /// The unit of a column whose name says `named`: that powers are relative may be said of any.
+    fn of_column(self, named: PowerUnit) -> PowerUnit {
+        match (named, self) {
+            (PowerUnit::Dbm, PowerUnit::RelativeDb) | (PowerUnit::Watt, PowerUnit::Counts) => self,
+            _ => named,
+        }
+    }
 }
 
 /// How a cloud file is to be read.
 ///
 /// ```
-/// use matdb::measure::{CloudFormat, CloudReading};
-/// let cloud = CloudReading::default().read(CloudFormat::Xyz, b"0.1 1.2 0.0 -62.5\n")?;
+/// use matdb::formats::PointFormat;
+/// use matdb::measure::CloudReading;
+/// let reading = CloudReading { columns: "Intensity=power_dbm".parse()?, ..Default::default() };
+/// let cloud = reading.read(PointFormat::Xyz, b"X Y Z Intensity\n0.1 1.2 0.0 -62.5\n")?;
 /// assert!((cloud.points()[0].power_w - 5.62e-10).abs() < 0.01e-10);
 /// # Ok::<(), matdb::measure::CloudError>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct CloudReading {
-    /// Metres per unit of x, y and z in PLY and plain text, above 0: 1 for metres, 0.001 for
-    /// millimetres. Columns with `_m` in their name are in metres always.
+    /// Metres per unit of x, y, z and range without a unit in their names, above 0: 1 for metres, 0.001 for
+    /// millimetres.
     pub metres_per_unit: f64,
-    /// Unit of powers whose column does not name it.
+    /// Unit of powers whose column does not name it. Also says that levels in dBm, or in W, are relative.
     pub power: PowerUnit,
     /// For positions in the target frame, equations (3) and (4); `None` for the global frame.
     pub global_from_target: Option<Pose<Global, Target>>,
+    /// Our names for the file's columns.
+    pub columns: ColumnNames,
 }
 
 impl Default for CloudReading {
     fn default() -> Self {
-        let power = PowerUnit::default();
-        CloudReading { metres_per_unit: 1.0, power, global_from_target: None }
-    }
-}
-
-impl CloudFormat {
-    /// The format that a file's extension stands for, in upper or lower case and without the dot.
-    pub fn from_extension(extension: &str) -> Option<CloudFormat> {
-        match extension.to_ascii_lowercase().as_str() {
-            "ply" => Some(CloudFormat::Ply),
-            "csv" => Some(CloudFormat::Csv),
-            "xyz" | "txt" => Some(CloudFormat::Xyz),
-            _ => None,
+        CloudReading {
+            metres_per_unit: 1.0,
+            power: PowerUnit::default(),
+            global_from_target: None,
+            columns: ColumnNames::default(),
         }
     }
 }
 
-/// Points of a file, and the levels of those whose power it states in dBm.
-#[derive(Default)]
-struct Detections {
-    points: Vec<CloudPoint>,
-    levels_dbm: Vec<f64>,
-}
+/// Names of the columns that are read.
+const KNOWN: [&str; 18] = [
+    "x_m",
+    "y_m",
+    "z_m",
+    "x_mm",
+    "y_mm",
+    "z_mm",
+    "x",
+    "y",
+    "z",
+    "power_dbm",
+    "power_w",
+    "power_db",
+    "power_counts",
+    "power",
+    "chirp",
+    "range_m",
+    "range_mm",
+    "range",
+];
 
 impl CloudReading {
     /// Reads a whole file.
@@ -90,90 +112,80 @@ impl CloudReading {
     /// # Errors
     /// When the bytes break the format, the powers betray a wrong unit, or the cloud cannot be used, see
     /// [`Cloud::new`].
-    pub fn read(&self, format: CloudFormat, bytes: &[u8]) -> Result<Cloud, CloudError> {
-        let detections = match format {
-            CloudFormat::Ply => self.read_ply(bytes),
-            CloudFormat::Csv => self.read_csv(bytes),
-            CloudFormat::Xyz => self.read_xyz(bytes),
-        }?;
-        detections.cloud()
-    }
-
-    fn read_ply(&self, bytes: &[u8]) -> Result<Detections, CloudError> {
-        let table = read_table(bytes)?;
-        let [xs, ys, zs] = ["x", "y", "z"].map(|name| column(&table, name));
-        let (xs, ys, zs) = (xs?, ys?, zs?);
-        let (powers, unit) = self.power_column(&table)?;
-        let chirps = table.column("chirp");
-        let ranges_m = table.column("range_m");
-        let mut detections = Detections::default();
-        for row in 0..table.rows() {
-            let place = DVec3::new(cell(xs, row), cell(ys, row), cell(zs, row));
-            let chirp = chirps.map(|chirps| chirp_number(row, cell(chirps, row))).transpose()?;
-            let power_w = detections.power_w(cell(powers, row), unit)?;
-            detections.points.push(CloudPoint {
-                chirp,
-                point: self.global(place * self.metres_per_unit),
-                range_m: ranges_m.map(|ranges_m| cell(ranges_m, row)),
-                power_w,
+    pub fn read(&self, format: PointFormat, bytes: &[u8]) -> Result<Cloud, CloudError> {
+        let mut table = PointTable::read(format, bytes)?;
+        table.rename(&self.columns)?;
+        table.lower_case();
+        table.check_names()?;
+        if table.is_empty() {
+            return Err(CloudError::Empty);
+        }
+        let places = self.places(&table)?;
+        let ranges_m = self.ranges_m(&table)?;
+        let chirps = table.column("chirp")?;
+        let (powers, unit) = self.powers(&table)?;
+        let mut points = Vec::with_capacity(places.len());
+        for (row, place) in places.into_iter().enumerate() {
+            let chirp = chirps.as_ref().map(|chirps| chirps[row]).filter(|chirp| !chirp.is_nan());
+            points.push(CloudPoint {
+                chirp: chirp.map(|chirp| chirp_number(row, chirp)).transpose()?,
+                point: self.global(place),
+                range_m: ranges_m.as_ref().map(|ranges_m| ranges_m[row]).filter(|r| !r.is_nan()),
+                power_w: power_w(row, powers[row], unit)?,
             });
         }
-        Ok(detections)
-    }
-
-    fn power_column<'t>(
-        &self,
-        table: &'t ply::Table,
-    ) -> Result<(&'t [f64], PowerUnit), CloudError> {
-        let named =
-            [("power_dbm", PowerUnit::Dbm), ("power_w", PowerUnit::Watt), ("power", self.power)];
-        named
-            .into_iter()
-            .find_map(|(name, unit)| Some((table.column(name)?, unit)))
-            .ok_or_else(|| missing(table, "power_dbm, power_w or power"))
-    }
-
-    fn read_csv(&self, bytes: &[u8]) -> Result<Detections, CloudError> {
-        let optional = ["chirp", "range_m", "power_dbm", "power_w"];
-        let table = csv::Table::read(bytes, &["x_m", "y_m", "z_m"], &optional)?;
-        let mut detections = Detections::default();
-        for row in 0..table.len() {
-            let [x, y, z] = ["x_m", "y_m", "z_m"].map(|name| table.required_number(row, name));
-            let is_numbered = table.cell(row, "chirp").is_some();
-            let chirp = is_numbered.then(|| table.whole_number(row, "chirp")).transpose()?;
-            let power_w = match table.number(row, "power_w")? {
-                Some(power_w) => detections.power_w(power_w, PowerUnit::Watt)?,
-                None => {
-                    let level_dbm = table.required_number(row, "power_dbm")?;
-                    detections.power_w(level_dbm, PowerUnit::Dbm)?
-                }
-            };
-            let point = self.global(DVec3::new(x?, y?, z?));
-            let range_m = table.number(row, "range_m")?;
-            detections.points.push(CloudPoint { chirp, point, range_m, power_w });
+        let mut cloud = Cloud::new(points)?;
+        if unit == PowerUnit::Dbm {
+            check_unit(&powers)?;
         }
-        Ok(detections)
+        cloud.scale = unit.scale();
+        cloud.notices.extend(table.notices.iter().cloned());
+        cloud.notices.extend(table.passed_over(&KNOWN));
+        Ok(cloud)
     }
 
-    fn read_xyz(&self, bytes: &[u8]) -> Result<Detections, CloudError> {
-        let text = std::str::from_utf8(bytes).map_err(|error| {
-            let place = format!("byte {}", error.valid_up_to());
-            FormatError::at(place, "the text is not UTF-8", "save the file as UTF-8")
-        })?;
-        let mut detections = Detections::default();
-        for (line, text) in text.lines().map(str::trim_start).enumerate() {
-            if text.is_empty() || text.starts_with('#') {
-                continue;
+    /// Places of the points, m.
+    fn places(&self, table: &PointTable) -> Result<Vec<DVec3>, CloudError> {
+        let units = [("_m", 1.0), ("_mm", 1e-3), ("", self.metres_per_unit)];
+        let names = table.names();
+        let mut found = units.into_iter();
+        let found = found.find(|(unit, _)| names.contains(&format!("x{unit}").as_str()));
+        let (unit, metres) = found.unwrap_or(units[2]);
+        let [xs, ys, zs] = ["x", "y", "z"].map(|axis| required(table, &format!("{axis}{unit}")));
+        let (xs, ys, zs) = (xs?, ys?, zs?);
+        let places = std::iter::zip(xs, std::iter::zip(ys, zs));
+        Ok(places.map(|(x, (y, z))| DVec3::new(x, y, z) * metres).collect())
+    }
+
+    fn ranges_m(&self, table: &PointTable) -> Result<Option<Vec<f64>>, CloudError> {
+        for (name, metres) in
+            [("range_m", 1.0), ("range_mm", 1e-3), ("range", self.metres_per_unit)]
+        {
+            if let Some(ranges) = table.column(name)? {
+                return Ok(Some(ranges.into_iter().map(|range| range * metres).collect()));
             }
-            let [x, y, z, power] = four_numbers(text).ok_or_else(|| {
-                let place = format!("line {}", line + 1);
-                FormatError::at(place, "these are not four finite numbers", "give x y z power")
-            })?;
-            let point = self.global(DVec3::new(x, y, z) * self.metres_per_unit);
-            let power_w = detections.power_w(power, self.power)?;
-            detections.points.push(CloudPoint { chirp: None, point, range_m: None, power_w });
         }
-        Ok(detections)
+        Ok(None)
+    }
+
+    fn powers(&self, table: &PointTable) -> Result<(Vec<f64>, PowerUnit), CloudError> {
+        let named = [
+            ("power_dbm", PowerUnit::Dbm),
+            ("power_w", PowerUnit::Watt),
+            ("power_db", PowerUnit::RelativeDb),
+            ("power_counts", PowerUnit::Counts),
+            ("power", self.power),
+        ];
+        let names = table.names();
+        let mut there = named.into_iter().filter(|(name, _)| names.contains(name));
+        match [there.next(), there.next()] {
+            [Some((first, _)), Some((second, _))] => Err(CloudError::TwoPowers { first, second }),
+            [Some((name, unit)), None] => {
+                let powers = table.full_column(name)?.unwrap_or_default();
+                Ok((powers, self.power.of_column(unit)))
+            }
+            _ => Err(missing(table, "power_dbm")),
+        }
     }
 
     fn global(&self, place: DVec3) -> Point<Global> {
@@ -184,62 +196,41 @@ impl CloudReading {
     }
 }
 
-impl Detections {
-    /// The power of the next point, W.
-    fn power_w(&mut self, value: f64, unit: PowerUnit) -> Result<f64, CloudError> {
-        let point = self.points.len();
-        match unit {
-            PowerUnit::Dbm if !value.is_finite() => {
-                Err(CloudError::NotFinite { what: "the power", point })
-            }
-            PowerUnit::Dbm if !POSSIBLE_DBM.contains(&value) => {
+/// The power of a point, W.
+fn power_w(point: usize, value: f64, unit: PowerUnit) -> Result<f64, CloudError> {
+    match unit {
+        _ if !value.is_finite() => Err(CloudError::NotFinite { what: "the power", point }),
+        PowerUnit::Dbm | PowerUnit::RelativeDb => {
+            if POSSIBLE_DBM.contains(&value) {
+                Ok(watts_from_dbm(value))
+            } else {
                 Err(CloudError::NoSuchPower { point, power_dbm: value })
             }
-            PowerUnit::Dbm => {
-                self.levels_dbm.push(value);
-                Ok(watts_from_dbm(value))
-            }
-            PowerUnit::Watt if value <= 0.0 => {
-                Err(CloudError::NotPositive { point, power_w: value })
-            }
-            PowerUnit::Watt => Ok(value),
         }
-    }
-
-    /// The cloud, unless its levels in dBm can only be watts.
-    fn cloud(self) -> Result<Cloud, CloudError> {
-        /// 10 mW: every received power in watts is below, and hardly one of many levels in dBm lies between
-        /// it and zero.
-        const STRONGEST_W: f64 = 0.01;
-        let cloud = Cloud::new(self.points)?;
-        let points = cloud.points().len();
-        let largest = self.levels_dbm.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let are_dbm = self.levels_dbm.len() < points
-            || largest > STRONGEST_W
-            || self.levels_dbm.iter().any(|level_dbm| *level_dbm < 0.0);
-        if are_dbm { Ok(cloud) } else { Err(CloudError::Watts { points, largest }) }
+        PowerUnit::Watt if value <= 0.0 => Err(CloudError::NotPositive { point, power_w: value }),
+        PowerUnit::Watt => Ok(value),
+        PowerUnit::Counts if value <= 0.0 => Err(CloudError::NoCounts { point, counts: value }),
+        // One count is as much as 0 dB.
+        PowerUnit::Counts => Ok(1e-3 * value),
     }
 }
 
-/// A cell of a column; NaN behind its end.
-fn cell(column: &[f64], row: usize) -> f64 {
-    column.get(row).copied().unwrap_or(f64::NAN)
+/// Refuses levels in dBm that can only be watts.
+fn check_unit(levels_dbm: &[f64]) -> Result<(), CloudError> {
+    /// 10 mW: every received power in watts is below, and hardly one of many levels in dBm lies between
+    /// it and zero.
+    const STRONGEST_W: f64 = 0.01;
+    let largest = levels_dbm.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let are_dbm = largest > STRONGEST_W || levels_dbm.iter().any(|level_dbm| *level_dbm < 0.0);
+    if are_dbm { Ok(()) } else { Err(CloudError::Watts { points: levels_dbm.len(), largest }) }
 }
 
-fn four_numbers(line: &str) -> Option<[f64; 4]> {
-    let numbers: Vec<f64> =
-        line.split_whitespace().map(|word| word.parse().ok()).collect::<Option<_>>()?;
-    let four: [f64; 4] = numbers.try_into().ok()?;
-    four.iter().all(|number| number.is_finite()).then_some(four)
+fn required(table: &PointTable, column: &str) -> Result<Vec<f64>, CloudError> {
+    table.full_column(column)?.ok_or_else(|| missing(table, column))
 }
 
-fn column<'t>(table: &'t ply::Table, name: &'static str) -> Result<&'t [f64], CloudError> {
-    table.column(name).ok_or_else(|| missing(table, name))
-}
-
-fn missing(table: &ply::Table, column: &'static str) -> CloudError {
-    let found: Vec<&str> = table.columns.iter().map(|column| column.name.as_str()).collect();
-    CloudError::MissingColumn { column, found: found.join(", ") }
+fn missing(table: &PointTable, column: &str) -> CloudError {
+    CloudError::MissingColumn { column: column.to_owned(), found: table.names().join(", ") }
 }
 
 fn chirp_number(point: usize, value: f64) -> Result<u32, CloudError> {
@@ -251,8 +242,9 @@ fn chirp_number(point: usize, value: f64) -> Result<u32, CloudError> {
 mod tests {
     use super::*;
 
-    const METRES: CloudReading =
-        CloudReading { metres_per_unit: 1.0, power: PowerUnit::Dbm, global_from_target: None };
+    fn metres() -> CloudReading {
+        CloudReading::default()
+    }
 
     fn ply(columns: &str, rows: &str) -> Vec<u8> {
         let count = rows.lines().count();
@@ -265,7 +257,7 @@ mod tests {
     #[test]
     fn our_own_cloud_is_read_without_its_truth() {
         let bytes = ply("x y z range_m power_dbm chirp facet", "0.1 1.2 0.3 8.5 -60 7 -1");
-        let cloud = METRES.read(CloudFormat::Ply, &bytes).unwrap();
+        let cloud = metres().read(PointFormat::Ply, &bytes).unwrap();
         let expected = CloudPoint {
             chirp: Some(7),
             point: Point::new(0.1, 1.2, 0.3),
@@ -273,16 +265,16 @@ mod tests {
             power_w: watts_from_dbm(-60.0),
         };
         assert_eq!(cloud.points(), [expected]);
-        assert!(cloud.notices.is_empty());
+        assert_eq!(cloud.notices, ["these columns are passed over: facet"]);
     }
 
     #[test]
     fn csv_and_text_need_no_chirp_and_say_so() {
         let csv = b"x_m,y_m,z_m,power_dbm\n0.1,1.2,0.3,-60\n";
         let xyz = b"# x y z dBm\n100 1200 300 -60\n\n";
-        let cloud = METRES.read(CloudFormat::Csv, csv).unwrap();
-        let millimetres = CloudReading { metres_per_unit: 1e-3, ..METRES };
-        let text = millimetres.read(CloudFormat::Xyz, xyz).unwrap();
+        let cloud = metres().read(PointFormat::Csv, csv).unwrap();
+        let millimetres = CloudReading { metres_per_unit: 1e-3, ..metres() };
+        let text = millimetres.read(PointFormat::Xyz, xyz).unwrap();
         assert!(text.points()[0].point.distance_m(cloud.points()[0].point) < 1e-15);
         assert!(cloud.notices[0].contains("1 of 1 points have no chirp number"));
     }
@@ -290,17 +282,17 @@ mod tests {
     #[test]
     fn watts_are_converted_only_when_stated() {
         let bytes = ply("x y z power", "0 0 0 1e-9\n1 0 0 1e-6");
-        let watts = CloudReading { power: PowerUnit::Watt, ..METRES };
-        let cloud = watts.read(CloudFormat::Ply, &bytes).unwrap();
+        let watts = CloudReading { power: PowerUnit::Watt, ..metres() };
+        let cloud = watts.read(PointFormat::Ply, &bytes).unwrap();
         assert_eq!(cloud.points()[1].power_w, 1e-6);
-        let error = METRES.read(CloudFormat::Ply, &bytes).unwrap_err();
+        let error = metres().read(PointFormat::Ply, &bytes).unwrap_err();
         assert!(matches!(error, CloudError::Watts { points: 2, .. }), "{error}");
         assert!(error.to_string().contains("these are watts, not dBm"), "{error}");
         assert_eq!(error, CloudError::Watts { points: 2, largest: 1e-6 });
-        let with_zero = METRES.read(CloudFormat::Xyz, b"0 0 0 0\n1 0 0 1e-6").unwrap_err();
+        let with_zero = metres().read(PointFormat::Xyz, b"0 0 0 0\n1 0 0 1e-6").unwrap_err();
         assert!(matches!(with_zero, CloudError::Watts { .. }), "{with_zero}");
-        assert!(METRES.read(CloudFormat::Xyz, b"0 0 0 -60\n1 0 0 1e-6").is_ok());
-        let negative = watts.read(CloudFormat::Xyz, b"0 0 0 -60").unwrap_err();
+        assert!(metres().read(PointFormat::Xyz, b"0 0 0 -60\n1 0 0 1e-6").is_ok());
+        let negative = watts.read(PointFormat::Xyz, b"0 0 0 -60").unwrap_err();
         assert_eq!(negative, CloudError::NotPositive { point: 0, power_w: -60.0 });
     }
 
@@ -308,27 +300,61 @@ mod tests {
     fn the_target_frame_is_mapped() {
         let frames = crate::radar::Radar::default().frames();
         let reading =
-            CloudReading { global_from_target: Some(frames.global_from_target), ..METRES };
-        let cloud = reading.read(CloudFormat::Xyz, b"0 0 8 -60").unwrap();
+            CloudReading { global_from_target: Some(frames.global_from_target), ..metres() };
+        let cloud = reading.read(PointFormat::Xyz, b"0 0 8 -60").unwrap();
         assert!(cloud.points()[0].point.distance_m(frames.origin()) < 1e-12);
     }
 
     #[test]
     fn hostile_files_are_refused_with_their_place() {
-        let refused = |format, bytes: &[u8]| METRES.read(format, bytes).unwrap_err().to_string();
-        assert!(refused(CloudFormat::Xyz, b"0 0 0\n").starts_with("line 1: these are not four"));
-        assert!(refused(CloudFormat::Xyz, b"#\n0 0 0 nan\n").starts_with("line 2"));
-        assert!(refused(CloudFormat::Xyz, b"0 0 \xff").contains("byte 4"));
-        assert!(refused(CloudFormat::Xyz, b"").contains("no points"));
+        let refused = |format, bytes: &[u8]| metres().read(format, bytes).unwrap_err().to_string();
+        assert!(
+            refused(PointFormat::Xyz, b"0 0 0\n").contains("no column power_dbm; it has: x, y, z")
+        );
+        assert!(refused(PointFormat::Xyz, b"#\n0 0 0 nan\n").starts_with("line 2"));
+        assert!(refused(PointFormat::Xyz, b"0 0 \xff").contains("line 1: the text is not UTF-8"));
+        assert!(refused(PointFormat::Xyz, b"").contains("no points"));
         let csv = b"x_m,y_m,z_m,power_dbm\n0,0,0,\n";
-        assert!(refused(CloudFormat::Csv, csv).contains("line 2, column power_dbm"));
+        assert!(refused(PointFormat::Csv, csv).contains("line 2, column power_dbm"));
         let ply_nan = ply("x y z power_dbm", "0 0 0 nan");
-        assert!(refused(CloudFormat::Ply, &ply_nan).contains("the power of point 0"));
+        assert!(refused(PointFormat::Ply, &ply_nan).contains("the power of point 0"));
+        let two = b"x_m,y_m,z_m,power_dbm,power_w\n0,0,0,-60,1e-9\n";
+        assert!(refused(PointFormat::Csv, two).contains("both power_dbm and power_w"));
         let no_power = ply("x y z", "0 0 0");
-        assert!(refused(CloudFormat::Ply, &no_power).contains("no column power_dbm"));
+        assert!(refused(PointFormat::Ply, &no_power).contains("no column power_dbm"));
         let chirp = ply("x y z power_dbm chirp", "0 0 0 -60 1.5");
-        assert!(refused(CloudFormat::Ply, &chirp).contains("chirp number 1.5"));
+        assert!(refused(PointFormat::Ply, &chirp).contains("chirp number 1.5"));
         let twice = ply("x y z power_dbm chirp", "0 0 0 -60 1\n0 0 0 -61 1");
-        assert!(refused(CloudFormat::Ply, &twice).contains("both of chirp 1"));
+        assert!(refused(PointFormat::Ply, &twice).contains("both of chirp 1"));
+    }
+
+    #[test]
+    fn other_peoples_columns_get_names_and_units() {
+        let columns = "X=x_mm,Y=y_mm,Z=z_mm,Intensity=power_dbm".parse().unwrap();
+        let reading = CloudReading { columns, ..metres() };
+        let text = b"X;Y;Z;Intensity;Time\n100;1200;300,5;-60,5;12:30\n";
+        let cloud = reading.read(PointFormat::Csv, text).unwrap();
+        assert!(cloud.points()[0].point.distance_m(Point::new(0.1, 1.2, 0.3005)) < 1e-12);
+        assert!((cloud.points()[0].power_w / watts_from_dbm(-60.5) - 1.0).abs() < 1e-12);
+        assert!(cloud.notices.contains(&"these columns are passed over: time".to_owned()));
+        let none = metres().read(PointFormat::Csv, text).unwrap_err().to_string();
+        assert!(none.contains("no column power_dbm; it has: x, y, z, intensity, time;"), "{none}");
+    }
+
+    #[test]
+    fn relative_powers_say_so() {
+        let text = b"0 0 0 3\n1 0 0 30\n";
+        let read = |power| CloudReading { power, ..metres() }.read(PointFormat::Xyz, text);
+        assert_eq!(read(PowerUnit::Dbm).unwrap().scale, Scale::Absolute);
+        let decibels = read(PowerUnit::RelativeDb).unwrap();
+        let counts = read(PowerUnit::Counts).unwrap();
+        assert_eq!([decibels.scale, counts.scale], [Scale::Relative; 2]);
+        assert!((counts.points()[1].power_w / counts.points()[0].power_w - 10.0).abs() < 1e-12);
+        let named = ply("x y z power_dbm", "0 0 0 -60");
+        let told = CloudReading { power: PowerUnit::RelativeDb, ..metres() };
+        assert_eq!(told.read(PointFormat::Ply, &named).unwrap().scale, Scale::Relative);
+        let none = CloudReading { power: PowerUnit::Counts, ..metres() };
+        let none = none.read(PointFormat::Xyz, b"0 0 0 0\n").unwrap_err().to_string();
+        assert!(none.contains("point 0 has 0 counts"), "{none}");
     }
 }

@@ -8,7 +8,7 @@
 
 use thiserror::Error;
 
-use crate::formats::FormatError;
+use crate::formats::{ColumnNames, FormatError};
 use crate::material;
 use crate::material::file::{Points, points};
 use crate::material::{Censor, Illumination, Observation};
@@ -31,7 +31,7 @@ pub const COLUMNS: [&str; 9] = [
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Curve {
     /// One per chirp. Those that [`Curve::read`] and [`Curve::of_material`] give leave out nothing but
-    /// the place on the target.
+    /// the place on the target; a detection has a threshold where only detections were recorded, and none otherwise.
     pub observations: Vec<Observation>,
     /// How the target was lit, as far as it is stated.
     pub illumination: Illumination,
@@ -54,6 +54,15 @@ pub enum ObservationError {
         /// Its number from 1.
         point: usize,
     },
+    /// A detection without its threshold, where only detections were recorded.
+    #[error(
+        "point {point} (from 1) has no threshold, and only detections were recorded; give it the least level that \
+         would have been detected"
+    )]
+    NoThreshold {
+        /// Its number from 1.
+        point: usize,
+    },
     /// Neither a value nor a threshold.
     #[error("point {point} (from 1) has no value and no threshold; give it one")]
     Empty {
@@ -68,9 +77,10 @@ impl Curve {
     /// # Errors
     /// The first observation that is not in a backscatter curve.
     pub fn of_material(curve: &material::Curve) -> Result<Curve, ObservationError> {
+        let illumination = curve.illumination;
         let completed = curve.observations.iter().enumerate();
-        let observations: Result<_, _> = completed.map(|(index, o)| complete(index, o)).collect();
-        Ok(Curve { observations: observations?, illumination: curve.illumination })
+        let completed = completed.map(|(index, o)| complete(index, o, illumination.only_detected));
+        Ok(Curve { observations: completed.collect::<Result<_, _>>()?, illumination })
     }
 
     /// Whether no observation has a power of its own, but σ⁰ in its place.
@@ -78,40 +88,78 @@ impl Curve {
         self.observations.iter().all(|o| o.power_w.is_none() || o.power_w == o.level_sigma0())
     }
 
-    /// Reads a curve file ([`points`]). Without a column a row is uncensored, its angle exact, its range 0, its
+    /// Reads a curve file, see [`Curve::read_as`], whose columns have our names.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn read(bytes: &[u8]) -> Result<Curve, FormatError> {
+        Ok(Curve::read_as(bytes, &ColumnNames::default())?.0)
+    }
+
+    /// Reads a curve file ([`points`]), and what a person should know of it. Of a table in the plane of incidence only
+    /// backscatter is read. Without a column a row is uncensored, its angle exact, its range 0, its
     /// power σ⁰ in watts, its chirp its number from 0.
     ///
     /// # Errors
     /// The first cell that cannot be used, with its line and column, and rows that are not backscatter.
-    pub fn read(bytes: &[u8]) -> Result<Curve, FormatError> {
-        let Points { rows, illumination } = points(bytes)?;
+    pub fn read_as(bytes: &[u8], names: &ColumnNames) -> Result<(Curve, Vec<String>), FormatError> {
+        let Points { mut rows, illumination, mut notices, in_plane } = points(bytes, names)?;
+        if in_plane {
+            let all = rows.len();
+            rows.retain(|(_, point)| point.is_retro());
+            if rows.is_empty() {
+                let problem = "no row is backscatter (theta_s_deg = -theta_i_deg)";
+                let way_out = "a table in the plane of incidence is for `matdb diagnose --curve`";
+                return Err(FormatError::at("the table", problem, way_out));
+            }
+            if rows.len() < all {
+                notices.push(format!(
+                    "{} of {all} rows are not backscatter and are left out",
+                    all - rows.len()
+                ));
+            }
+        }
         let mut observations = Vec::new();
         for (index, (line, point)) in rows.iter().enumerate() {
-            observations.push(complete(index, point).map_err(|error| {
+            let completed = complete(index, point, illumination.only_detected);
+            observations.push(completed.map_err(|error| {
                 let problem = match error {
                     ObservationError::Bistatic { .. } => "the row is bistatic",
                     ObservationError::AboveRange { .. } => {
                         "the row is above the instrument's range"
                     }
                     ObservationError::Empty { .. } => "the row has no value and no threshold",
+                    ObservationError::NoThreshold { .. } => {
+                        let problem = "only detections were recorded, and the row has no threshold";
+                        let way_out = "fill in the least σ⁰ that would have been detected";
+                        let place = format!("line {line}, column threshold_db");
+                        return FormatError::at(place, problem, way_out);
+                    }
                 };
                 FormatError::at(format!("line {line}"), problem, "leave it out here")
             })?);
         }
-        Ok(Curve { observations, illumination })
+        Ok((Curve { observations, illumination }, notices))
     }
 
     /// The curve as a file's bytes.
     pub fn write(&self) -> Vec<u8> {
-        let [names, lit] = self.illumination.columns();
+        let [mut names, lit] = self.illumination.columns();
+        let only_detected = self.illumination.only_detected;
+        if only_detected {
+            names = format!(",threshold_db{names}");
+        }
         let mut text = format!("{}{names}\n", COLUMNS.join(","));
         for (index, o) in self.observations.iter().enumerate() {
             let sigma0 = o.level_sigma0().unwrap_or(f64::NAN);
             let [xt_m, yt_m] = o.target_m.map_or_else(Default::default, |place| {
                 place.map(|metres| format!("{:.5}", metres + 0.0))
             });
+            let limit = o.threshold_sigma0.filter(|_| only_detected);
+            let limit =
+                limit.map_or(String::new(), |limit| format!(",{:.3}", db_from_ratio(limit)));
             text += &format!(
-                "{:.4},{:.4},{:.3},{:.3},{:.5},{},{},{xt_m},{yt_m}{lit}\n",
+                "{:.4},{:.4},{:.3},{:.3},{:.5},{},{},{xt_m},{yt_m}{limit}{lit}\n",
                 o.theta_i_rad.to_degrees(),
                 o.theta_sd_rad.unwrap_or(0.0).to_degrees(),
                 dbm_from_watts(o.power_w.unwrap_or(sigma0)),
@@ -146,9 +194,18 @@ pub(crate) fn backscatter_level(index: usize, o: &Observation) -> Result<f64, Ob
 }
 
 /// An observation with the defaults of [`Curve::read`] for what it leaves out.
-fn complete(index: usize, o: &Observation) -> Result<Observation, ObservationError> {
+fn complete(
+    index: usize,
+    o: &Observation,
+    only_detected: bool,
+) -> Result<Observation, ObservationError> {
     let sigma0 = backscatter_level(index, o)?;
+    let threshold_sigma0 = o.threshold_sigma0.filter(|_| only_detected || o.is_censored());
+    if only_detected && threshold_sigma0.is_none() {
+        return Err(ObservationError::NoThreshold { point: index + 1 });
+    }
     Ok(Observation {
+        threshold_sigma0,
         theta_sd_rad: o.theta_sd_rad.or(Some(0.0)),
         power_w: o.power_w.or(Some(sigma0)),
         range_m: o.range_m.or(Some(0.0)),
@@ -179,8 +236,8 @@ mod tests {
         let text = "theta_deg,theta_sd_deg,power_dbm,sigma0_db,range_m,chirp,censored,xt_m,yt_m,footprint,beam_rad\n\
                     12.5000,0.3000,-55.250,-9.125,8.01250,17,0,-0.01250,0.20000,projected,0.011704\n";
         let curve = Curve::read(text.as_bytes()).unwrap();
-        let lit = Illumination { footprint: Some(Footprint::Projected), beam_rad: Some(0.011704) };
-        assert_eq!(curve.illumination, lit);
+        let Illumination { footprint, beam_rad, .. } = curve.illumination;
+        assert_eq!((footprint, beam_rad), (Some(Footprint::Projected), Some(0.011704)));
         assert_eq!(String::from_utf8(curve.write()).unwrap(), text);
     }
 

@@ -3,13 +3,14 @@
 //! As CSV: `theta_i_deg,theta_s_deg,brdf_per_sr`, and `sd_db` where it is known. θ_s is positive on the
 //! side of the mirror direction, so that θ_s = θ_i is the mirror and θ_s = −θ_i the way back. A pair of
 //! angles may occur several times, as repeated measurements. Values that the instrument could
-//! not measure, such as those behind its own detector, are left out.
+//! not measure, such as those behind its own detector, are left out, and so is a value that is not above its blank,
+//! `blank_per_sr`.
 //!
 //! Also read are the isotropic tables of optical design programs (`.bsdf`), whose angles are counted from
 //! the mirror direction: azimuth 0 leads towards the normal and past it, 180° away from it.
 
-use crate::formats::FormatError;
-use crate::formats::csv::Table;
+use crate::formats::csv::{Names, Table};
+use crate::formats::{ColumnNames, FormatError};
 
 /// One measured value.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,42 +28,64 @@ pub struct InPlane {
 /// Grazing directions say nothing of a surface, degrees.
 const GRAZING_DEG: f64 = 89.9;
 
-/// Reads the table.
+/// Columns of a table.
+const REQUIRED: [&str; 3] = ["theta_i_deg", "theta_s_deg", "brdf_per_sr"];
+const OPTIONAL: [&str; 2] = ["sd_db", "blank_per_sr"];
+/// Values that are no slip, 1/sr.
+const VALUES_PER_SR: (f64, f64) = (1e-30, 1e30);
+
+/// Reads the table, whose columns have these names of ours, and what a person should know of it.
 ///
 /// # Errors
 /// The first cell that cannot be used, with its line and column.
-pub fn read_table(bytes: &[u8]) -> Result<Vec<InPlane>, FormatError> {
-    let table = Table::read(bytes, &["theta_i_deg", "theta_s_deg", "brdf_per_sr"], &["sd_db"])?;
-    (0..table.len()).map(|row| read_row(&table, row)).collect()
+pub fn read_table(
+    bytes: &[u8],
+    names: &ColumnNames,
+) -> Result<(Vec<InPlane>, Vec<String>), FormatError> {
+    let mut table = Table::parse(bytes, Names::InFirstLine)?;
+    table.rename(names)?;
+    table.lower_case();
+    table.check(&REQUIRED)?;
+    let known: Vec<&str> = REQUIRED.iter().chain(&OPTIONAL).copied().collect();
+    let mut notices: Vec<String> = table.passed_over(&known).into_iter().collect();
+    let mut found = Vec::with_capacity(table.len());
+    for row in 0..table.len() {
+        let point = read_row(&table, row)?;
+        let blank = table.number_within(row, "blank_per_sr", VALUES_PER_SR)?;
+        if blank.is_none_or(|blank| point.f_per_sr > blank) {
+            found.push(point);
+        }
+    }
+    let below = table.len() - found.len();
+    if below > 0 && found.is_empty() {
+        let problem = "no value is above its blank, so that nothing was measured";
+        return Err(FormatError::at("the table", problem, "check which column is the blank"));
+    }
+    if below > 0 {
+        let all = table.len();
+        notices.push(format!("{below} of {all} values are not above their blank and are left out"));
+    }
+    Ok((found, notices))
 }
 
 /// Whether the bytes are a table of bistatic values, by its header.
-pub fn is_table(bytes: &[u8]) -> bool {
-    let header = bytes.split(|byte| *byte == b'\n').next().unwrap_or(&[]);
-    String::from_utf8_lossy(header).split(',').any(|name| name.trim() == "theta_s_deg")
+pub fn is_table(bytes: &[u8], names: &ColumnNames) -> bool {
+    let Ok(mut table) = Table::parse(bytes, Names::InFirstLine) else { return false };
+    let renamed = table.rename(names).is_ok();
+    table.lower_case();
+    renamed && table.has("theta_s_deg")
 }
 
 fn read_row(table: &Table, row: usize) -> Result<InPlane, FormatError> {
     let sd_db = table.number_within(row, "sd_db", (1e-6, 100.0))?;
-    let theta_i_deg = required_within(table, row, "theta_i_deg", (0.0, GRAZING_DEG))?;
-    let theta_s_deg = required_within(table, row, "theta_s_deg", (-GRAZING_DEG, GRAZING_DEG))?;
+    let theta_i_deg = table.required_within(row, "theta_i_deg", (0.0, GRAZING_DEG))?;
+    let theta_s_deg = table.required_within(row, "theta_s_deg", (-GRAZING_DEG, GRAZING_DEG))?;
     Ok(InPlane {
         theta_i_rad: theta_i_deg.to_radians(),
         theta_s_rad: theta_s_deg.to_radians(),
-        f_per_sr: required_within(table, row, "brdf_per_sr", (1e-30, 1e30))?,
+        f_per_sr: table.required_within(row, "brdf_per_sr", VALUES_PER_SR)?,
         sd_db,
     })
-}
-
-/// A number from the least to the greatest that must be there.
-fn required_within(
-    table: &Table,
-    row: usize,
-    column: &str,
-    range: (f64, f64),
-) -> Result<f64, FormatError> {
-    table.required_number(row, column)?;
-    Ok(table.number_within(row, column, range)?.unwrap_or_default())
 }
 
 /// Reads the plane of incidence of a `.bsdf` table at its first sample rotation; zeros, which stand
@@ -226,10 +249,17 @@ mod tests {
         assert!(message(&BSDF.replace("4 5 6", "4 5")).contains("line 14: 2 values for 3 angles"));
         assert!(message(&BSDF.replace("0 20 80", "0 x 80")).contains("line 8"));
         assert!(message(&BSDF.replace("Radial 3", "Radial 4")).contains("3 angles"));
-        let table = |text: &str| read_table(text.as_bytes()).unwrap_err().to_string();
+        let table = |text: &str| {
+            read_table(text.as_bytes(), &ColumnNames::default()).unwrap_err().to_string()
+        };
         let header = "theta_i_deg,theta_s_deg,brdf_per_sr\n";
         assert!(table(&format!("{header}10,95,0.1\n")).contains("column theta_s_deg"));
         assert!(table(&format!("{header}10,20,0\n")).contains("column brdf_per_sr"));
-        assert!(is_table(header.as_bytes()) && !is_table(b"theta_deg,sigma0_db\n"));
+        let ours = ColumnNames::default();
+        assert!(is_table(header.as_bytes(), &ours) && !is_table(b"theta_deg,sigma0_db\n", &ours));
+        let blank = b"theta_i_deg;theta_s_deg;brdf_per_sr;blank_per_sr;note\n10;-10;0,2;0,1;a\n10;20;0,1;0,1;b\n";
+        let (found, notices) = read_table(blank, &ours).unwrap();
+        assert_eq!((found.len(), found[0].f_per_sr), (1, 0.2));
+        assert!(notices[0].contains("passed over: note") && notices[1].starts_with("1 of 2"));
     }
 }

@@ -10,7 +10,6 @@
 use std::collections::HashSet;
 use std::f64::consts::PI;
 
-use glam::DVec3;
 use rayon::prelude::*;
 
 use super::cloud::{Cloud, CloudPoint};
@@ -18,14 +17,12 @@ use super::curve::Curve;
 use super::error::ReductionError;
 use super::exclusions::Exclusions;
 use super::incidence::{Incidence, Sighting};
-use super::nearest::Nearest;
-use super::point_rays::rays_to_points;
+use super::point_rays::PointRays;
 use super::register::RegistrationResult;
 use super::widening::{CurveWidening, Widening};
 use crate::formats::words::significant;
 use crate::frames::{Global, Point, Pose, Ray, Target as TargetFrame};
-use crate::material::{Illumination, Observation};
-use crate::radar::scan::PATTERN_RANGE_M;
+use crate::material::{Illumination, Observation, Scale};
 use crate::radar::{Chirps, Footprint, Link, Radar};
 use crate::scene::Target;
 use crate::units::watts_from_dbm;
@@ -84,6 +81,8 @@ struct Reducer<'a> {
     exact_mesh: bool,
     gate_m: f64,
     threshold_w: f64,
+    /// Whether a detection needs its threshold: nothing is known of the silent chirps.
+    only_detected: bool,
 }
 
 /// Equation (8) solved for σ⁰ by definition (10), a pure number: for a power received, W, of the beam
@@ -117,13 +116,25 @@ impl Reduction {
             return Err(ReductionError::NotConverged);
         }
         self.check_region(target)?;
-        check_threshold(radar, cloud)?;
-        let point_rays = rays_to_points(cloud, radar, chirps)?;
-        let reducer = self.reducer(target, radar, registered);
-        let assignment = Assignment::new(radar, chirps, cloud, &point_rays);
+        let relative = cloud.scale == Scale::Relative;
+        if !relative {
+            check_threshold(radar, cloud)?;
+        }
+        let point_rays = PointRays::of(cloud, radar, chirps)?;
+        let assignment = Assignment::new(&point_rays, chirps.only_detected);
+        let only_detected = assignment.only_detected;
+        let reducer = Reducer {
+            threshold_w: if relative {
+                weakest_w(cloud)
+            } else {
+                watts_from_dbm(radar.threshold_dbm)
+            },
+            only_detected,
+            ..self.reducer(target, radar, registered)
+        };
         assignment.check_shared()?;
         let mut left_out = Exclusions::default();
-        let mut rows = detected(&reducer, cloud, &point_rays, &assignment, &mut left_out);
+        let mut rows = detected(&reducer, cloud, &point_rays.rays, &assignment, &mut left_out);
         if rows.is_empty() {
             return Err(ReductionError::NoRows(left_out));
         }
@@ -138,11 +149,15 @@ impl Reduction {
                  wrong; name the part that was kept with a region"
             ));
         }
-        let (observations, widenings): (Vec<_>, Vec<_>) = rows.into_iter().unzip();
+        let (mut observations, widenings): (Vec<_>, Vec<_>) = rows.into_iter().unzip();
+        if relative {
+            from_strongest(&mut observations);
+        }
         let widening = CurveWidening::of(&widenings);
         notices.extend(widening.and_then(|widening| self.curvature(&widening)));
         let beam_rad = widening.map(|widening| self.beam_rad(&widening));
-        let illumination = Illumination { footprint: Some(radar.footprint), beam_rad };
+        let footprint = Some(radar.footprint);
+        let illumination = Illumination { footprint, beam_rad, relative, only_detected };
         let curve = Curve { observations, illumination };
         Ok(ReductionResult { curve, left_out, notices })
     }
@@ -202,6 +217,7 @@ impl Reduction {
             exact_mesh: self.exact_mesh,
             gate_m: GATE_SD * registered.rms_m.max(LEAST_RMS_M),
             threshold_w: watts_from_dbm(radar.threshold_dbm),
+            only_detected: false,
         }
     }
 }
@@ -249,13 +265,16 @@ impl Reducer<'_> {
         let sigma0 = sigma0(&self.link, ray, range_m, hit.cos_theta, power_w);
         let at = Point::from(ray.origin.xyz + range_m * ray.direction.xyz());
         let at = (self.target_from_global * at).xyz;
+        let level = Observation::of_level(hit.theta_rad(), sigma0, censored);
+        let limit = self.only_detected.then_some(sigma0 * self.threshold_w / power_w);
         let observation = Observation {
+            threshold_sigma0: level.threshold_sigma0.or(limit),
             theta_sd_rad: Some(theta_sd_rad),
             power_w: Some(power_w),
             range_m: Some(range_m),
             chirp: Some(chirp),
             target_m: Some([at.x, at.y]),
-            ..Observation::of_level(hit.theta_rad(), sigma0, censored)
+            ..level
         };
         Fate::Row(observation, Widening::of(&self.incidence, &self.link.beam, ray, sighting))
     }
@@ -325,62 +344,29 @@ fn silent(
 }
 
 /// Which chirp each point belongs to, and which chirps have no point.
-struct Assignment {
+struct Assignment<'a> {
     chirp_of_point: Vec<u32>,
     /// Indices in the scan of the chirps without a point.
-    silent: Vec<usize>,
+    silent: &'a [usize],
+    /// Whether silent chirps cannot be recognised.
+    only_detected: bool,
     notices: Vec<String>,
 }
 
-/// The directions of a scan's rays, in the order of its chirps.
-struct Directions {
-    directions: Vec<DVec3>,
-    tree: Option<Nearest>,
-    /// Largest angle between a ray and a point on it, rad.
-    near_rad: f64,
-}
-
-impl Directions {
-    fn new(radar: &Radar, chirps: &Chirps) -> Directions {
-        let directions: Vec<DVec3> = chirps.rays.iter().map(|ray| ray.direction.xyz()).collect();
-        let tree = Nearest::new(&directions);
-        // An eighth of a spot: far below the distance of two chirps of a scan.
-        Directions { directions, tree, near_rad: radar.spot_fwhm_m() / 8.0 / PATTERN_RANGE_M }
-    }
-
-    /// The chirp whose ray runs along `ray`.
-    fn chirp_along(&self, chirps: &Chirps, ray: &Ray<Global>) -> Option<u32> {
-        let (index, off_rad) = self.tree.as_ref()?.find(ray.direction.xyz());
-        if off_rad <= self.near_rad { chirps.number.get(index).copied() } else { None }
-    }
-}
-
-impl Assignment {
-    /// Points without a number belong to the chirp whose ray they lie on; a chirp is silent when no
-    /// point has its number and no point without a number lies on its ray.
-    fn new(
-        radar: &Radar,
-        chirps: &Chirps,
-        cloud: &Cloud,
-        point_rays: &[Ray<Global>],
-    ) -> Assignment {
-        let directions = Directions::new(radar, chirps);
-        let mut unmatched = 0;
-        let mut chirp_of_point = Vec::with_capacity(point_rays.len());
-        for ((point, ray), place) in std::iter::zip(cloud.points(), point_rays).zip(0..) {
-            let chirp = point.chirp.or_else(|| directions.chirp_along(chirps, ray));
-            unmatched += usize::from(chirp.is_none());
-            chirp_of_point.push(chirp.unwrap_or(place));
-        }
+impl Assignment<'_> {
+    fn new(point_rays: &PointRays, only_detected: bool) -> Assignment<'_> {
+        let unmatched = point_rays.chirps.iter().filter(|chirp| chirp.is_none()).count();
+        let chirp_of_point =
+            point_rays.chirps.iter().zip(0..).map(|(chirp, place)| chirp.unwrap_or(place));
         // More strays than false alarms explain: then silent chirps cannot be recognised.
-        let lost = unmatched * 10 > cloud.points().len();
-        let silent =
-            if lost { Vec::new() } else { silent_chirps(chirps, cloud, point_rays, &directions) };
+        let lost = unmatched * 10 > point_rays.chirps.len();
+        let only_detected = only_detected || lost;
+        let silent = if only_detected { &[] } else { point_rays.silent.as_slice() };
         let mut notices = Vec::new();
         if unmatched > 0 {
             let effect = if lost {
-                "; no chirp is taken for silent, so that a fit attributes the cut at the threshold to \
-                 the material: give the scene the scan of the measurement"
+                "; which chirps were silent is not known, so that the curve holds only detections: give the scene the \
+                 scan of the measurement"
             } else {
                 ""
             };
@@ -389,7 +375,8 @@ impl Assignment {
                  the cloud{effect}"
             ));
         }
-        Assignment { chirp_of_point, silent, notices }
+        let chirp_of_point = chirp_of_point.collect();
+        Assignment { chirp_of_point, silent, only_detected, notices }
     }
 
     fn check_shared(&self) -> Result<(), ReductionError> {
@@ -403,6 +390,21 @@ impl Assignment {
     }
 }
 
+/// Counts levels of an unknown unit from the strongest of them.
+fn from_strongest(observations: &mut [Observation]) {
+    let strongest = observations.iter().filter_map(|row| row.sigma0).fold(0.0, f64::max);
+    for row in observations.iter_mut().filter(|_| strongest > 0.0) {
+        for level in [&mut row.sigma0, &mut row.threshold_sigma0].into_iter().flatten() {
+            *level /= strongest;
+        }
+    }
+}
+
+/// The least power of a cloud, W: what a radar of unknown level detects at least.
+fn weakest_w(cloud: &Cloud) -> f64 {
+    cloud.points().iter().map(|point| point.power_w).fold(f64::INFINITY, f64::min)
+}
+
 /// The threshold of the scene must be that of the measurement, or silence means something else.
 pub(super) fn check_threshold(radar: &Radar, cloud: &Cloud) -> Result<(), ReductionError> {
     // A file may round its powers by this ratio, 0.05 dB.
@@ -414,33 +416,8 @@ pub(super) fn check_threshold(radar: &Radar, cloud: &Cloud) -> Result<(), Reduct
     if below * TOLERATED <= points {
         return Ok(());
     }
-    let weakest_w = cloud.points().iter().map(|point| point.power_w).fold(f64::INFINITY, f64::min);
+    let weakest_w = weakest_w(cloud);
     Err(ReductionError::BelowThreshold { below, points, threshold_w, weakest_w })
-}
-
-/// Indices of the chirps of which no point has the number and no unnumbered point lies on the ray.
-fn silent_chirps(
-    chirps: &Chirps,
-    cloud: &Cloud,
-    point_rays: &[Ray<Global>],
-    scan: &Directions,
-) -> Vec<usize> {
-    let numbers: HashSet<u32> = cloud.points().iter().filter_map(|point| point.chirp).collect();
-    let unnumbered: Vec<DVec3> = std::iter::zip(cloud.points(), point_rays)
-        .filter(|(point, _)| point.chirp.is_none())
-        .map(|(_, ray)| ray.direction.xyz())
-        .collect();
-    let tree = Nearest::new(&unnumbered);
-    let mut silent = Vec::new();
-    for (index, (number, direction)) in std::iter::zip(&chirps.number, &scan.directions).enumerate()
-    {
-        let has_point = numbers.contains(number)
-            || tree.as_ref().is_some_and(|tree| tree.find(*direction).1 <= scan.near_rad);
-        if !has_point {
-            silent.push(index);
-        }
-    }
-    silent
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ use super::coarse::{self, Alignment};
 use super::error::RegistrationError;
 use super::freedom::{Freedom, Untold};
 use super::icp::{Gap, Motion, NormalEquations, bulk_sd_m, rigid};
-use super::point_rays::rays_to_points;
+use super::point_rays::PointRays;
 use super::settings::{Metric, Registration, Start};
 use super::start;
 use super::uncertainty::uncertainty;
@@ -104,8 +104,8 @@ impl Registration {
         if points < self.least_points {
             return Err(RegistrationError::TooFew { points, least: self.least_points });
         }
-        let point_rays = rays_to_points(cloud, radar, chirps)?;
-        let view = View::new(mesh, &chirps.rays, cloud, &point_rays);
+        let point_rays = PointRays::of(cloud, radar, chirps)?;
+        let view = View::new(mesh, &chirps.rays, cloud, &point_rays.rays);
         let along_ray = self.metric == Metric::AlongRay;
         if let Start::Given(given) = &self.start
             && self.keep

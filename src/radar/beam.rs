@@ -20,7 +20,6 @@ use std::f64::consts::{LN_2, PI, SQRT_2};
 
 use glam::DVec3;
 
-use super::scan::PATTERN_RANGE_M;
 use super::settings::{BeamEntry, Radar, SpotDiameter};
 use crate::frames::{Direction, Global, Point, Pose, Ray, Target};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
@@ -54,6 +53,8 @@ pub struct Beam {
     /// The beam towards the centre of the field of view.
     central: GaussianBeam,
     target_from_global: Pose<Target, Global>,
+    /// Range of the target plane, m.
+    pattern_range_m: f64,
 }
 
 impl Beam {
@@ -67,6 +68,7 @@ impl Beam {
                 focus_m: radar.beam.focus_m,
             },
             target_from_global: radar.frames().global_from_target.inverse(),
+            pattern_range_m: radar.frames().pattern_range_m,
         }
     }
 
@@ -81,7 +83,7 @@ impl Beam {
 
     /// The beam along a ray from the radar.
     pub fn along(&self, axis: &Ray<Global>) -> GaussianBeam {
-        let looks_at = Point::from(axis.origin.xyz + PATTERN_RANGE_M * axis.direction.xyz());
+        let looks_at = Point::from(axis.origin.xyz + self.pattern_range_m * axis.direction.xyz());
         let aim = (self.target_from_global * looks_at).xyz;
         self.towards(aim.x, aim.y)
     }

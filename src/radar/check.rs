@@ -37,6 +37,7 @@ impl Radar {
             ("alpha_deg", self.alpha_deg, (-360.0, 360.0)),
             ("chirp_period_s", self.chirp_period_s, (1e-9, 3600.0)),
         ];
+        self.validate_place()?;
         let parts = self.beam.checks().into_iter().chain(self.optics.checks());
         let parts = parts.chain(self.polarisation.checks());
         let parts = parts.chain(self.scan.checks());

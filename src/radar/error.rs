@@ -112,6 +112,26 @@ pub enum RadarError {
     /// Equation (1) cannot be fitted.
     #[error(transparent)]
     F5(#[from] F5Error),
+    /// A place that is half given.
+    #[error("radar.{name} is missing beside the other keys of the radar's place: {way_out}")]
+    HalfAPlace {
+        /// The key.
+        name: &'static str,
+        /// What to do.
+        way_out: &'static str,
+    },
+    /// Keys that are no place.
+    #[error(
+        "radar.position_m, look_at_m and up are no place for a radar: give finite metres, from 1 mm to 10 km apart, and an \
+         `up` that does not lie along the line of sight"
+    )]
+    NoPlace,
+    /// Two places.
+    #[error(
+        "the radar has two places: leave out position_m, look_at_m and up, or reflector_centre_m, secondary_focus_m, \
+         tau_deg, primary_focus_m and alpha_deg"
+    )]
+    TwoPlaces,
     /// The file of an explicit scan cannot be read.
     #[error("cannot read the scan {file}: {reason}; it is looked for beside the scene file")]
     Unreadable {

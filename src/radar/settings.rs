@@ -74,6 +74,16 @@ pub struct Radar {
     /// α: yaw of the antenna on the table, degrees. −90: assumed; antenna and global axes are then
     /// parallel, and the radar looks along −z.
     pub alpha_deg: f64,
+    /// Where the rays start, m, in the global frame: together with `look_at_m` in place of the five keys before, for a
+    /// radar without the paper's frames.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_m: Option<[f64; 3]>,
+    /// The middle of the target plane, m, in the global frame; patterns have their sizes there.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub look_at_m: Option<[f64; 3]>,
+    /// Which way is up in the image; of any length. (0, 1, 0) beside a `position_m`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub up: Option<[f64; 3]>,
     /// Time from one chirp to the next, s. 200e-6: assumed; a scan of 18 529 chirps takes 3.7 s.
     pub chirp_period_s: f64,
     /// How a sweep is sampled; of use with a receiver.

@@ -187,7 +187,12 @@ fn check_walls(setup: &Setup, receiver: Point<Global>) -> Result<(), RenderError
     let (antenna, key, at) = if around_receiver.abs() > around_radar.abs() {
         ("receiver", "position_m", receiver)
     } else {
-        ("radar", "reflector_centre_m, or the target", radar)
+        let key = if setup.geometry.radar.position_m.is_some() {
+            "position_m, or the target"
+        } else {
+            "reflector_centre_m, or the target"
+        };
+        ("radar", key, radar)
     };
     let [x_m, y_m, z_m] = at.xyz.to_array();
     Err(RenderError::Inside { antenna, key, x_m, y_m, z_m })
@@ -208,8 +213,11 @@ fn miss(geometry: &ScanGeometry) -> RenderError {
         let mut to_vertices = mesh.vertices.iter().map(|vertex| vertex - ray.origin.xyz);
         to_vertices.any(|to_vertex| to_vertex.dot(ray.direction.xyz()) > 0.0)
     });
+    let is_placed = geometry.radar.position_m.is_some();
     let way_out = if target.sides_m().into_iter().any(|side_m| side_m > HUGE_M) {
         "is the mesh in millimetres? give it scale = 0.001"
+    } else if is_placed {
+        "move the mesh with translation_m, or let the radar look at it with radar.look_at_m"
     } else if !is_ahead {
         "it stands behind the radar: move it with translation_m or turn the radar with radar.alpha_deg"
     } else {

@@ -5,10 +5,10 @@ use std::path::Path;
 
 use crate::error::Error;
 use crate::formats::figure::{Figure, Plot, Scale, Series, Style};
+use crate::formats::words::significant;
 use crate::geometry::Raster;
 use crate::geometry::raster::Channel;
 use crate::radar::f5::{Domain, F5Deviation};
-use crate::radar::scan::PATTERN_RANGE_M;
 use crate::radar::{Beam, Chirps, F5, Field, Radar};
 use crate::scene::{SceneError, SceneFile, read_regular, read_text};
 
@@ -18,7 +18,7 @@ pub struct RadarReport {
     pub radar: Radar,
     /// The rays of its scan.
     pub chirps: Chirps,
-    /// What the scan covers at 8 m.
+    /// What the scan covers at the range of the pattern.
     pub field: Field,
     /// Where the polynomial holds.
     pub domain: Domain,
@@ -49,13 +49,15 @@ impl RadarReport {
     pub fn files(&self) -> Result<Vec<(&'static str, Vec<u8>)>, Error> {
         let RadarReport { radar, chirps, field, .. } = self;
         let spot = spot_raster(radar, *field);
-        let scan = scan_plot(radar, chirps, *field);
+        let [scan_title, spot_title] = ["Scan", "Spot"]
+            .map(|what| format!("{what} at {} m", significant(radar.frames().pattern_range_m, 3)));
+        let scan = scan_plot(radar, chirps, *field, &scan_title);
         Ok(vec![
             ("scan.csv", scan_csv(radar, chirps).into_bytes()),
             ("scan.png", scan.png()?),
             ("scan.svg", scan.svg()?.into_bytes()),
             ("spot.csv", spot_csv(&spot).into_bytes()),
-            ("spot.png", spot_figure(&spot, radar).png()?),
+            ("spot.png", spot_figure(&spot, radar, &spot_title).png()?),
             ("f5.toml", f5_toml(&self.f5).into_bytes()),
         ])
     }
@@ -96,12 +98,12 @@ fn scan_csv(radar: &Radar, chirps: &Chirps) -> String {
     text
 }
 
-fn scan_plot<'a>(radar: &'a Radar, chirps: &Chirps, field: Field) -> Plot<'a> {
+fn scan_plot<'a>(radar: &'a Radar, chirps: &Chirps, field: Field, title: &'a str) -> Plot<'a> {
     let points = chirps.target_points_m(&radar.frames()).map(|p| (p.x, p.y)).collect();
     let [x_range, y_range] =
         [0, 1].map(|axis| Some((field.min_m[axis] - 0.02, field.max_m[axis] + 0.02)));
     Plot {
-        title: "Scan at 8 m",
+        title,
         subtitle: &radar.preset,
         x_label: "x in the target plane, m",
         y_label: "y in the target plane, m",
@@ -127,12 +129,13 @@ fn spot_raster(radar: &Radar, field: Field) -> Raster {
         channels: Vec::new(),
     };
     let beam = Beam::new(radar);
+    let range_m = radar.frames().pattern_range_m;
     let pixels =
         (0..raster.height).flat_map(|row| (0..raster.width).map(move |column| (row, column)));
     let values = pixels
         .map(|(row, column)| {
             let diameter_m =
-                beam.towards(raster.x_m(column), raster.y_m(row)).section(PATTERN_RANGE_M).fwhm_m();
+                beam.towards(raster.x_m(column), raster.y_m(row)).section(range_m).fwhm_m();
             (1e3 * diameter_m) as f32
         })
         .collect();
@@ -149,11 +152,11 @@ fn spot_csv(spot: &Raster) -> String {
     text
 }
 
-fn spot_figure<'a>(spot: &'a Raster, radar: &'a Radar) -> Figure<'a> {
+fn spot_figure<'a>(spot: &'a Raster, radar: &'a Radar, title: &'a str) -> Figure<'a> {
     Figure {
         raster: spot,
         channel: "spot_mm",
-        title: "Spot at 8 m",
+        title,
         subtitle: &radar.preset,
         colour_label: "diameter at half intensity, mm",
         range: None,

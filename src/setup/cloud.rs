@@ -7,20 +7,20 @@ use serde::Deserialize;
 
 use crate::error::Error;
 use crate::files::read_whole;
+use crate::formats::PointFormat;
 use crate::frames::{Global, Pose};
-use crate::measure::{Cloud, CloudFormat, CloudReading};
+use crate::measure::{Cloud, CloudReading};
 
-/// Reads a measured cloud; the ending of its name says the format: .ply, .csv or .xyz.
+/// Reads a measured cloud; the ending of its name says the [format](PointFormat).
 ///
 /// # Errors
 /// Another ending; a file that cannot be read or is refused.
 pub fn read_cloud(path: &Path, reading: &CloudReading) -> Result<Cloud, Error> {
     let extension = path.extension().unwrap_or_default().to_string_lossy();
-    let Some(format) = CloudFormat::from_extension(&extension) else {
-        return Err(Error::usage(
-            format!("`{}` does not end in .ply, .csv or .xyz", path.display()),
-            "convert or rename the cloud",
-        ));
+    let Some(format) = PointFormat::from_extension(&extension) else {
+        let problem = format!("`{}` has the ending of no format of clouds", path.display());
+        let way_out = format!("convert or rename it: .{}", PointFormat::EXTENSIONS.join(", ."));
+        return Err(Error::usage(problem, way_out));
     };
     let cloud = reading.read(format, &read_whole(path)?);
     cloud.map_err(|error| Error::Cloud { file: path.to_owned(), error })

@@ -16,6 +16,7 @@
 mod cloud;
 mod database;
 mod materials;
+mod new_scene;
 mod scene;
 mod validity;
 mod view;
@@ -26,6 +27,7 @@ pub use materials::{
     MaterialRevision, builtin_not_added, find_material, later_status_warning, status_warning,
     store_of_not_added, unknown_material,
 };
+pub use new_scene::{MadeScene, NewScene};
 pub use scene::{Assembly, ReadyScene, SceneMaterial, resolve_effects};
 pub use validity::{ValidityWarning, unmet_conditions, unmet_sentence};
 pub use view::{View, antenna};

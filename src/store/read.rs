@@ -258,11 +258,15 @@ fn status(row: &Row, column: usize) -> Result<Status> {
 /// Curves of a revision, or the one of this name.
 fn curves(conn: &Connection, revision_id: i64, only: Option<&str>) -> Result<Vec<Curve>> {
     let sql = "
-        SELECT name, source, instrument, session, footprint, beam_rad FROM curve
+        SELECT name, source, instrument, session, footprint, beam_rad, coalesce(relative, 0),
+            coalesce(only_detected, 0)
+        FROM curve
         LEFT JOIN curve_session
             ON curve_session.revision_id = curve.revision_id AND curve_session.curve = name
         LEFT JOIN curve_illumination AS lit
             ON lit.revision_id = curve.revision_id AND lit.curve = name
+        LEFT JOIN curve_levels AS levels
+            ON levels.revision_id = curve.revision_id AND levels.curve = name
         WHERE curve.revision_id = ?1 AND name = coalesce(?2, name) ORDER BY position";
     rows(conn, sql, params![revision_id, only], |row| {
         let name: String = row.get(0)?;
@@ -272,7 +276,12 @@ fn curves(conn: &Connection, revision_id: i64, only: Option<&str>) -> Result<Vec
             source: row.get(1)?,
             instrument: row.get(2)?,
             session: row.get(3)?,
-            illumination: Illumination { footprint: row.get(4)?, beam_rad: row.get(5)? },
+            illumination: Illumination {
+                footprint: row.get(4)?,
+                beam_rad: row.get(5)?,
+                relative: row.get(6)?,
+                only_detected: row.get(7)?,
+            },
             observations,
         })
     })

@@ -331,12 +331,19 @@ impl Rows<'_> {
                 params![self.revision_id, name, session],
             )?;
         }
-        if *illumination != Illumination::default() {
-            let Illumination { footprint, beam_rad } = illumination;
+        let Illumination { footprint, beam_rad, relative, only_detected } = illumination;
+        if footprint.is_some() || beam_rad.is_some() {
             self.insert(
                 "INSERT INTO curve_illumination (revision_id, curve, footprint, beam_rad)
                  VALUES (?1, ?2, ?3, ?4)",
                 params![self.revision_id, name, footprint.map(Footprint::as_str), beam_rad],
+            )?;
+        }
+        if *relative || *only_detected {
+            self.insert(
+                "INSERT INTO curve_levels (revision_id, curve, relative, only_detected)
+                 VALUES (?1, ?2, ?3, ?4)",
+                params![self.revision_id, name, relative, only_detected],
             )?;
         }
         let mut insert = self.tx.prepare_cached(

@@ -224,9 +224,19 @@ pub fn placed(slug: &str) -> Material {
 /// The same with the beam of its curve, and a fit of the surface's own lobes.
 pub fn lit(slug: &str) -> Material {
     let mut material = placed(slug);
-    material.curves[0].illumination =
-        Illumination { footprint: Some(Footprint::Projected), beam_rad: Some(0.0117) };
+    material.curves[0].illumination = Illumination {
+        footprint: Some(Footprint::Projected),
+        beam_rad: Some(0.0117),
+        ..Illumination::default()
+    };
     material.fits[0].lobes = Lobes::Surface;
+    material
+}
+
+/// The same with levels up to a common factor.
+pub fn relative(slug: &str) -> Material {
+    let mut material = lit(slug);
+    material.curves[0].illumination.relative = true;
     material
 }
 

@@ -2,6 +2,7 @@
 
 use super::detail::Detail;
 use super::error::ExchangeError;
+use crate::formats::ColumnNames;
 use crate::material::{Material, Slug, SourceKind};
 
 /// What a person states about a foreign file; what is none must be in the file.
@@ -35,6 +36,8 @@ pub struct Details {
     pub frequency_hz: Option<f64>,
     /// Least power that counts as a detection, W.
     pub threshold_w: Option<f64>,
+    /// Our names for the columns of a table.
+    pub columns: ColumnNames,
 }
 
 impl Details {

@@ -95,8 +95,8 @@ impl Foreign {
         }
     }
 
-    /// Makes a material of a file's bytes and of what a person states in addition. `file` names it in errors and
-    /// sources.
+    /// Makes a material of a file's bytes and of what a person states in addition, and says what a person should know of
+    /// the file. `file` names it in errors and sources.
     ///
     /// # Errors
     /// When the bytes do not follow the format, or neither they nor `given` state what an entry needs.
@@ -105,15 +105,15 @@ impl Foreign {
         file: &str,
         bytes: &[u8],
         given: &Details,
-    ) -> Result<Material, ExchangeError> {
-        let mut material = match self {
-            Foreign::OpticalConstants => optical_constants::read(file, bytes, given),
-            Foreign::Csv => plain_csv::read(file, bytes, given),
-            Foreign::UniversalBrdf => universal_brdf_in::read(file, bytes, given),
-        }?;
+    ) -> Result<(Material, Vec<String>), ExchangeError> {
+        let (mut material, notices) = match self {
+            Foreign::OpticalConstants => (optical_constants::read(file, bytes, given)?, Vec::new()),
+            Foreign::Csv => plain_csv::read(file, bytes, given)?,
+            Foreign::UniversalBrdf => (universal_brdf_in::read(file, bytes, given)?, Vec::new()),
+        };
         given.complete(&mut material);
         match material.validate() {
-            Ok(()) => Ok(material),
+            Ok(()) => Ok((material, notices)),
             Err(error) => Err(ExchangeError::Material { file: file.to_owned(), error }),
         }
     }

@@ -27,6 +27,8 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Export, ExchangeErr
         real("yt_m"),
         Column { name: "footprint".to_owned(), kind: ColumnKind::Text, required: false },
         real("beam_rad"),
+        whole("relative"),
+        whole("only_detected"),
     ];
     let table =
         Table { name: "observation".to_owned(), columns, key: Vec::new(), references: Vec::new() };
@@ -48,6 +50,8 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Export, ExchangeErr
             cell(point.target_m.map(|[_, yt_m]| yt_m)),
             footprint,
             cell(lit.beam_rad),
+            Cell::Integer(i64::from(lit.relative)),
+            Cell::Integer(i64::from(lit.only_detected)),
         ]
     });
     let about = format!("{}\n{} GHz", subject.about().join("\n"), points.frequency_hz / 1e9);
@@ -58,6 +62,10 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Export, ExchangeErr
         describe(&points)
     );
     Ok(Export { files: vec![(name.to_owned(), bytes)], lost })
+}
+
+fn whole(name: &str) -> Column {
+    Column { name: name.to_owned(), kind: ColumnKind::Integer, required: true }
 }
 
 fn real(name: &str) -> Column {

@@ -68,10 +68,15 @@ pub(super) fn describe(points: &Points) -> String {
     }
 }
 
-/// Makes a material of a curve.
-pub(super) fn read(file: &str, bytes: &[u8], given: &Details) -> Result<Material, ExchangeError> {
-    let points = file::points(bytes).map_err(|error| ExchangeError::in_file(file, error))?;
-    let illumination = points.illumination;
+/// Makes a material of a curve, and says what a person should know of the file.
+pub(super) fn read(
+    file: &str,
+    bytes: &[u8],
+    given: &Details,
+) -> Result<(Material, Vec<String>), ExchangeError> {
+    let points =
+        file::points(bytes, &given.columns).map_err(|error| ExchangeError::in_file(file, error))?;
+    let (illumination, notices) = (points.illumination, points.notices);
     let observations: Vec<Observation> = points.rows.into_iter().map(|(_, point)| point).collect();
     if observations.is_empty() {
         let empty =
@@ -123,7 +128,7 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Details) -> Result<Material
         illumination,
         observations,
     };
-    Ok(of_curve(file, given, single))
+    Ok((of_curve(file, given, single), notices))
 }
 
 /// A curve and all that an entry must state about it.

@@ -10,7 +10,7 @@ use crate::units::{db_from_ratio, dbm_from_watts};
 
 use super::entry::kind_of;
 
-const COLUMNS: [&str; 16] = [
+const COLUMNS: [&str; 18] = [
     "curve",
     "kind",
     "theta_deg",
@@ -27,6 +27,8 @@ const COLUMNS: [&str; 16] = [
     "yt_m",
     "footprint",
     "beam_rad",
+    "relative",
+    "only_detected",
 ];
 
 /// Every point in a row; a cell without a value is empty.
@@ -36,7 +38,7 @@ pub(super) fn csv(material: &Material) -> Result<Vec<u8>, CatalogueError> {
     out.write_record(COLUMNS).map_err(failed)?;
     for curve in &material.curves {
         let kind = kind_of(material, &curve.source).map_or("unknown", SourceKind::as_str);
-        let Illumination { footprint, beam_rad } = curve.illumination;
+        let Illumination { footprint, beam_rad, relative, only_detected } = curve.illumination;
         let footprint = footprint.map(Footprint::as_str).unwrap_or_default();
         for o in &curve.observations {
             let record = [
@@ -56,6 +58,8 @@ pub(super) fn csv(material: &Material) -> Result<Vec<u8>, CatalogueError> {
                 cell(o.target_m.map(|[_, yt_m]| yt_m + 0.0), 6),
                 footprint.to_owned(),
                 cell(beam_rad, 6),
+                flag(relative),
+                flag(only_detected),
             ];
             out.write_record(record).map_err(failed)?;
         }
@@ -65,6 +69,10 @@ pub(super) fn csv(material: &Material) -> Result<Vec<u8>, CatalogueError> {
 
 fn cell(value: Option<f64>, decimals: usize) -> String {
     value.map_or(String::new(), |value| format!("{value:.decimals$}"))
+}
+
+fn flag(on: bool) -> String {
+    if on { "1".to_owned() } else { String::new() }
 }
 
 /// An angle in degrees, never −0.

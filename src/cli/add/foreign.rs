@@ -7,6 +7,7 @@ use crate::catalogue::exchange::Details;
 use crate::cli::curves::kind_of;
 use crate::cli::list::KINDS;
 use crate::error::Error;
+use crate::formats::ColumnNames;
 use crate::material::{Slug, SourceKind};
 use crate::units::watts_from_dbm;
 
@@ -17,6 +18,9 @@ pub(super) struct DetailArgs {
     /// Short name that the material gets
     #[arg(long, value_name = "NAME")]
     name: Option<Slug>,
+    /// Our names for the columns of a .csv, as in inc=theta_deg,NRCS=sigma0_db; - passes one over
+    #[arg(long, value_name = "THEIRS=OURS")]
+    columns: Option<ColumnNames>,
     /// Full name [default: the short one]
     #[arg(long)]
     title: Option<String>,
@@ -80,6 +84,7 @@ impl DetailArgs {
         check_frequency_and_threshold(frequency_hz, threshold_w)?;
         Ok(Details {
             slug: self.name.clone(),
+            columns: self.columns.clone().unwrap_or_default(),
             name: self.title.clone(),
             class: self.class.clone(),
             description: self.description.clone(),

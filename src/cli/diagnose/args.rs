@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::cli::cloud::CloudArgs;
+use crate::cli::cloud::{CloudArgs, ColumnArgs};
 
 /// Find the physical effect that a model lacks to explain a measurement
 #[derive(Debug, clap::Args)]
@@ -22,6 +22,8 @@ report.json are written, and the status is not 0.")]
 pub struct Args {
     #[command(flatten)]
     pub cloud: Option<CloudArgs>,
+    #[command(flatten)]
+    pub columns: ColumnArgs,
     /// Further clouds of the same target: of another pose or antenna, or repeats. One joint answer is found
     #[arg(value_name = "CLOUD", index = 2, conflicts_with = "curve")]
     pub further: Vec<PathBuf>,

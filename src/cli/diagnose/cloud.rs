@@ -8,7 +8,7 @@ use super::refusal::write_refusal;
 use crate::adopt::{
     CheckedRequest, CloudRequest, Earlier, Publication, PublicationResult, as_answer, name_beside,
 };
-use crate::cli::cloud::CloudArgs;
+use crate::cli::cloud::{CloudArgs, ColumnArgs};
 use crate::cli::console::Console;
 use crate::cli::effects::chosen;
 use crate::diagnose::{DiagnoseError, Report};
@@ -49,7 +49,7 @@ pub(super) fn run(
         Err(error) => return refuse(as_answer(error)?, &request, console),
     };
     let notices = checked.notices();
-    match diagnose(cloud, &checked, &notices, console) {
+    match diagnose(cloud, &args.columns, &checked, &notices, console) {
         Ok(report) => publish(&checked, &report, &notices, db, console),
         Err(error) => refuse(as_answer(error)?, &request, console),
     }
@@ -72,6 +72,7 @@ fn scene_of_each(args: &Args) -> Result<Vec<&Path>, Error> {
 /// Reads the clouds and diagnoses them, with a sign of life.
 fn diagnose(
     cloud: &CloudArgs,
+    columns: &ColumnArgs,
     checked: &CheckedRequest,
     notices: &[String],
     console: &Console,
@@ -81,7 +82,14 @@ fn diagnose(
     }
     let mut clouds = Vec::new();
     for (path, ready) in checked.request.clouds().zip(checked.scenes()) {
-        clouds.push(cloud.read_another(path, ready.scene.radar())?);
+        let chirps = &ready.scene.chirps;
+        if chirps.only_detected {
+            return Err(Error::usage(
+                format!("the scan of {} holds only chirps that were detected", path.display()),
+                "a diagnosis needs the silent ones: give the scene the whole scan, and set radar.scan.complete",
+            ));
+        }
+        clouds.push(cloud.read_absolute(path, columns, ready.scene.radar())?);
     }
     for notice in clouds.iter().flat_map(|cloud| &cloud.notices).chain(notices) {
         console.notice(notice);

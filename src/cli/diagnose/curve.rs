@@ -23,13 +23,17 @@ pub(super) fn run(path: &Path, args: &Args, console: &Console) -> Result<(), Err
     let effects = chosen(&args.effects)?;
     let request = CurveRequest {
         path,
+        columns: &args.columns.names(),
         law: law.as_ref(),
         noise_db: args.noise_db,
         effects: &effects,
         seed: args.seed,
     };
     match request.diagnose(&bytes) {
-        Ok(report) => publish(&report, path, &effects, args, console),
+        Ok((report, notices)) => {
+            notices.iter().for_each(|notice| console.notice(notice));
+            publish(&report, path, &effects, args, console)
+        }
         Err(Error::CurveDiagnosis { error, .. }) => refuse(error, path, &args.output, console),
         Err(other) => Err(other),
     }

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 use serde::Serialize;
 
+use super::cloud::ColumnArgs;
 use super::console::Console;
 use super::curves::{Circumstances, OWN, kind_of};
 use super::plot::write_plot;
@@ -52,6 +53,8 @@ pub(super) struct Args {
     /// Curve of the material [default: the longest], or the name to store a file's curve under [default: that of the file]
     #[arg(long, value_name = "NAME")]
     curve: Option<String>,
+    #[command(flatten)]
+    columns: ColumnArgs,
     /// What to fit, and where to start [default: what the material renders, else mixture]
     #[arg(long, value_name = "MODEL|MATERIAL")]
     model: Option<String>,
@@ -165,6 +168,7 @@ fn request(args: &Args) -> Result<FitRequest<'_>, Error> {
     Ok(FitRequest {
         what: &args.what,
         curve: args.curve.as_deref(),
+        columns: args.columns.names(),
         model: args.model.as_deref(),
         method: args.method.into(),
         alpha: args.alpha,

@@ -72,11 +72,12 @@ impl Patch {
         let (sin, cos) = (2.0 * (-y_m).atan2(-x_m)).sin_cos();
         let radius_m = self.radius_m * (self.oval * cos + self.slant * sin).exp();
         // The shot is at least this far from the ray of the centre.
-        let axes = stage.geometry.radar.frames().global_from_target.rotation();
+        let frames = stage.geometry.radar.frames();
+        let axes = frames.global_from_target.rotation();
         let aside = x_m * axes.x_axis + y_m * axes.y_axis;
         let beside_m = aside.reject_from_normalized(shot.ray.direction.xyz()).length()
             * shot.hit.range_m
-            / PATTERN_RANGE_M;
+            / frames.pattern_range_m;
         if beside_m > radius_m + FADED * self.fade_m {
             return 1.0;
         }

@@ -26,7 +26,7 @@ use super::slug::Slug;
 use super::status::Status;
 use crate::brdf::Brdf;
 use crate::formats::text::{from_toml, to_toml};
-use crate::formats::{EffectEntry, FormatError};
+use crate::formats::{ColumnNames, EffectEntry, FormatError};
 use crate::radar::Footprint;
 pub use points::{Points, points};
 
@@ -198,10 +198,10 @@ fn read_curve(
         reason,
     })?;
     let csv = Path::new(file).with_file_name(&entry.file);
-    let points = points(&bytes)
+    let points = points(&bytes, &ColumnNames::default())
         .map_err(|error| FileError::Format { file: csv.display().to_string(), error })?;
     let CurveFile { name, source, instrument, session, footprint, beam_rad, .. } = entry;
-    let stated = Illumination { footprint, beam_rad };
+    let stated = Illumination { footprint, beam_rad, ..Illumination::default() };
     let Some(illumination) = points.illumination.and(stated) else {
         let problem = "states another footprint or beam than its [[curve]]";
         let error = value(&csv.display().to_string(), problem, "state each once, or the same");

@@ -1,13 +1,25 @@
-//! The CSV of a curve, as every command reads it: a point per line, in degrees and dB.
+//! The table of a curve, as every command reads it: a point per line, in degrees and dB.
+//!
+//! An angle is `theta_deg`, `grazing_deg` (from the surface), or `theta_signed_deg`, whose sign is left alone: one side
+//! of the normal is as good as the other. A level is `sigma0_db` or `sigma0`, a ratio. Both may instead be those of the
+//! plane of incidence: `theta_i_deg`, `theta_s_deg` (positive on the side of the mirror direction) and `brdf_per_sr`.
+//! A level that is not above its blank (`blank_db`, or `blank_per_sr`) counts as a limit at the blank.
 
-use crate::formats::FormatError;
-use crate::formats::csv::{Table, without_head};
+use std::f64::consts::PI;
+
+use crate::formats::csv::{Names, Table};
+use crate::formats::{ColumnNames, FormatError};
 use crate::material::curve::{Censor, Illumination, Observation};
 use crate::radar::Footprint;
-use crate::units::{ratio_from_db, watts_from_dbm};
+use crate::units::{db_from_ratio, ratio_from_db, watts_from_dbm};
 
-const REQUIRED: [&str; 2] = ["theta_deg", "sigma0_db"];
-const OPTIONAL: [&str; 15] = [
+/// Columns of the angle of backscatter, of which one is needed.
+const ANGLES: [&str; 3] = ["theta_deg", "grazing_deg", "theta_signed_deg"];
+/// Columns of the level of backscatter, of which one is needed.
+const LEVELS: [&str; 2] = ["sigma0_db", "sigma0"];
+/// Columns of a table in the plane of incidence, all needed.
+const IN_PLANE: [&str; 3] = ["theta_i_deg", "theta_s_deg", "brdf_per_sr"];
+const OPTIONAL: [&str; 20] = [
     "censor",
     "threshold_db",
     "theta_r_deg",
@@ -21,12 +33,21 @@ const OPTIONAL: [&str; 15] = [
     "yt_m",
     "footprint",
     "beam_rad",
+    "relative",
+    "only_detected",
     "curve",
     "kind",
+    "blank_db",
+    "blank_per_sr",
+    "sd_db",
 ];
 
 /// Angles that a surface can be seen under, degrees.
 const QUARTER_TURN_DEG: (f64, f64) = (0.0, 90.0);
+/// Grazing directions say nothing of a surface, degrees.
+const GRAZING_DEG: f64 = 89.9;
+/// Values of f that are no slip, 1/sr.
+const BRDFS_PER_SR: (f64, f64) = (1e-30, 1e30);
 /// Levels that are no slip, dB.
 const LEVELS_DB: (f64, f64) = (-300.0, 300.0);
 /// Powers that are no slip, dBm.
@@ -44,27 +65,146 @@ const BEAMS_RAD: (f64, f64) = (1e-6, std::f64::consts::FRAC_PI_2);
 pub struct Points {
     /// Each point behind the number of its line.
     pub rows: Vec<(usize, Observation)>,
-    /// How the target was lit, as far as the columns `footprint` and `beam_rad` state it.
+    /// How the target was lit and seen, as far as columns state it.
     pub illumination: Illumination,
+    /// Whether the table is one in the plane of incidence, of which few rows are backscatter.
+    pub in_plane: bool,
+    /// What a person should know of the file.
+    pub notices: Vec<String>,
 }
 
-/// Reads a curve's CSV. Lines of `#` at the head are left alone.
+/// Reads a curve's table, whose columns have these names of ours; others are passed over with a notice. Lines of `#` at
+/// the head are left alone.
 ///
 /// Where nothing was detected, `censor` is `left` and `threshold_db` the σ⁰ that it stayed below; `censored`
 /// = 1, as `matdb measure` writes, says the same of the level in `sigma0_db`.
 ///
 /// # Errors
-/// The first cell that cannot be used, with its line and column.
-pub fn points(bytes: &[u8]) -> Result<Points, FormatError> {
-    let table = Table::read(&without_head(bytes), &REQUIRED, &OPTIONAL)?;
+/// The first cell that cannot be used, with its line and column; a table in which every level is below its blank.
+pub fn points(bytes: &[u8], names: &ColumnNames) -> Result<Points, FormatError> {
+    let mut table = Table::parse(bytes, Names::InFirstLine)?;
+    table.rename(names)?;
+    table.lower_case();
+    let form = Form::of(&table)?;
+    let known: Vec<&str> = [&ANGLES[..], &LEVELS, &IN_PLANE, &OPTIONAL].concat();
+    let mut notices: Vec<String> = table.passed_over(&known).into_iter().collect();
     one_of(&table, "curve", "another curve begins here")?;
     one_of(&table, "footprint", "the rows above have another footprint")?;
     one_of(&table, "beam_rad", "the rows above have another beam")?;
+    one_of(&table, "relative", "the rows above say otherwise")?;
+    one_of(&table, "only_detected", "the rows above say otherwise")?;
     let mut rows = Vec::with_capacity(table.len());
+    let mut below = 0;
     for row in 0..table.len() {
-        rows.push((table.line(row), point(&table, row)?));
+        let point = form.point(&table, row)?;
+        let (point, is_below) = above_blank(point, form.blank(&table, row, &point)?);
+        below += usize::from(is_below);
+        rows.push((table.line(row), point));
     }
-    Ok(Points { rows, illumination: illumination(&table)? })
+    if below > 0 {
+        let all = rows.len();
+        if below == all {
+            let problem = "no level is above its blank, so that nothing was measured";
+            return Err(FormatError::at("the table", problem, "check which column is the blank"));
+        }
+        notices
+            .push(format!("{below} of {all} levels are not above their blank and count as limits"));
+    }
+    let in_plane = matches!(form, Form::InPlane);
+    Ok(Points { rows, illumination: illumination(&table)?, in_plane, notices })
+}
+
+/// What the rows of a table hold.
+#[derive(Clone, Copy, Debug)]
+enum Form {
+    /// Backscatter over the column of its angle, as the column of its level.
+    Backscatter { angle: &'static str, level: &'static str },
+    /// The plane of incidence.
+    InPlane,
+}
+
+impl Form {
+    fn of(table: &Table) -> Result<Form, FormatError> {
+        if IN_PLANE[1..].iter().any(|column| table.has(column)) {
+            table.check(&IN_PLANE)?;
+            return Ok(Form::InPlane);
+        }
+        let (angle, level) = (the_one(table, &ANGLES)?, the_one(table, &LEVELS)?);
+        table.check(&[])?;
+        Ok(Form::Backscatter { angle, level })
+    }
+
+    fn point(self, table: &Table, row: usize) -> Result<Observation, FormatError> {
+        match self {
+            Form::Backscatter { angle, level } => point(table, row, angle, level),
+            Form::InPlane => in_plane_point(table, row),
+        }
+    }
+
+    /// The blank of a row as σ⁰.
+    fn blank(
+        self,
+        table: &Table,
+        row: usize,
+        point: &Observation,
+    ) -> Result<Option<f64>, FormatError> {
+        match self {
+            Form::Backscatter { .. } => {
+                Ok(table.number_within(row, "blank_db", LEVELS_DB)?.map(ratio_from_db))
+            }
+            Form::InPlane => {
+                let blank = table.number_within(row, "blank_per_sr", BRDFS_PER_SR)?;
+                Ok(blank.map(|f_per_sr| f_per_sr * sigma0_per_f(point)))
+            }
+        }
+    }
+}
+
+/// σ⁰ over f: 4π·cos θ_i·cos θ_r.
+fn sigma0_per_f(point: &Observation) -> f64 {
+    4.0 * PI * point.theta_i_rad.cos() * point.theta_r_rad.cos()
+}
+
+/// The only one of some columns.
+fn the_one(table: &Table, names: &[&'static str]) -> Result<&'static str, FormatError> {
+    let there: Vec<&'static str> = names.iter().copied().filter(|name| table.has(name)).collect();
+    match there[..] {
+        [] => {
+            table.check(&names[..1])?;
+            Ok(names[0])
+        }
+        [only] => Ok(only),
+        [first, second, ..] => Err(FormatError::at(
+            "the header",
+            format!("there are both `{first}` and `{second}`"),
+            format!("pass one over, as by --columns {second}=-"),
+        )),
+    }
+}
+
+/// The point as a limit at its blank, where its level is not above that; and whether it is so.
+fn above_blank(point: Observation, blank_sigma0: Option<f64>) -> (Observation, bool) {
+    match (point.sigma0, blank_sigma0) {
+        (Some(sigma0), Some(blank)) if sigma0 <= blank => {
+            let threshold_sigma0 = Some(blank);
+            (Observation { sigma0: None, censor: Censor::Left, threshold_sigma0, ..point }, true)
+        }
+        _ => (point, false),
+    }
+}
+
+/// A row in the plane of incidence.
+fn in_plane_point(table: &Table, row: usize) -> Result<Observation, FormatError> {
+    let theta_i_deg = table.required_within(row, "theta_i_deg", (0.0, GRAZING_DEG))?;
+    let theta_s_deg = table.required_within(row, "theta_s_deg", (-GRAZING_DEG, GRAZING_DEG))?;
+    let f_per_sr = table.required_within(row, "brdf_per_sr", BRDFS_PER_SR)?;
+    let place = Observation {
+        theta_r_rad: theta_s_deg.abs().to_radians(),
+        // Back where the light came from, or on the other side of the normal.
+        delta_phi_rad: if theta_s_deg > 0.0 { PI } else { 0.0 },
+        ..Observation::backscatter(theta_i_deg.to_radians(), None, None)
+    };
+    Ok(Observation { sigma0: Some(f_per_sr * sigma0_per_f(&place)), censor: Censor::None, ..place })
 }
 
 /// Refuses a table with two values of a column that belongs to the curve: that of a published page may have several
@@ -91,22 +231,64 @@ fn illumination(table: &Table) -> Result<Illumination, FormatError> {
             _ => return Err(cell.refuse("write paper or projected, or leave it empty")),
         }),
     };
-    Ok(Illumination { footprint, beam_rad: table.number_within(0, "beam_rad", BEAMS_RAD)? })
+    Ok(Illumination {
+        footprint,
+        beam_rad: table.number_within(0, "beam_rad", BEAMS_RAD)?,
+        relative: flag(table, "relative")?,
+        only_detected: flag(table, "only_detected")?,
+    })
 }
 
-fn point(table: &Table, row: usize) -> Result<Observation, FormatError> {
+/// A column that is 1 in every row, or 0, or not there.
+fn flag(table: &Table, column: &str) -> Result<bool, FormatError> {
+    match table.cell(0, column) {
+        None => Ok(false),
+        Some(cell) => match cell.text {
+            "1" => Ok(true),
+            "0" => Ok(false),
+            _ => Err(cell.refuse("give 1 for yes, else 0")),
+        },
+    }
+}
+
+/// The angle of incidence of a row, degrees.
+fn theta_i_deg(table: &Table, row: usize, angle: &str) -> Result<f64, FormatError> {
+    let range = if angle == "theta_signed_deg" { (-90.0, 90.0) } else { QUARTER_TURN_DEG };
+    let stated_deg = table.required_within(row, angle, range)?;
+    Ok(if angle == "grazing_deg" { 90.0 - stated_deg } else { stated_deg.abs() })
+}
+
+/// The level of a row, dB.
+fn level_db(table: &Table, row: usize, level: &str) -> Result<Option<f64>, FormatError> {
+    if level == "sigma0_db" {
+        return table.number_within(row, level, LEVELS_DB);
+    }
+    match (table.number(row, level)?, table.cell(row, level)) {
+        (Some(ratio), Some(cell)) if ratio <= 0.0 => Err(cell.refuse(
+            "a level that is not above zero is a limit: write `left` in `censor`, and the level \
+                             of the noise in `threshold_db`",
+        )),
+        (ratio, _) => Ok(ratio.map(db_from_ratio)),
+    }
+}
+
+fn point(
+    table: &Table,
+    row: usize,
+    angle: &str,
+    level: &'static str,
+) -> Result<Observation, FormatError> {
     let number = |column: &'static str, range| table.number_within(row, column, range);
-    table.required_number(row, "theta_deg")?;
-    let theta_i_deg = number("theta_deg", QUARTER_TURN_DEG)?.unwrap_or_default();
+    let theta_i_deg = theta_i_deg(table, row, angle)?;
     let censor = censor(table, row)?;
-    let level_db = number("sigma0_db", LEVELS_DB)?;
+    let level_db = level_db(table, row, level)?;
     let limit_db = number("threshold_db", LEVELS_DB)?;
     let is_flagged = censor == Censor::Left && table.cell(row, "censored").is_some();
     let (level_db, limit_db) = match (censor, level_db, limit_db) {
         (Censor::Left, level, limit) if is_flagged => (None, limit.or(level)),
         (_, level, limit) => (level, limit),
     };
-    stated(table, row, censor, [level_db, limit_db])?;
+    stated(table, row, censor, [level_db, limit_db], level)?;
     let chirp = table.cell(row, "chirp").map(|_| table.whole_number(row, "chirp")).transpose()?;
     Ok(Observation {
         theta_i_rad: theta_i_deg.to_radians(),
@@ -168,6 +350,7 @@ fn stated(
     row: usize,
     censor: Censor,
     [level, limit]: [Option<f64>; 2],
+    column: &str,
 ) -> Result<(), FormatError> {
     const LIMIT: &str = "the limit, in σ⁰ dB, in `threshold_db` (the radar's threshold is in dBm and \
                          stands elsewhere)";
@@ -176,13 +359,13 @@ fn stated(
     };
     match (censor, level, limit) {
         (Censor::None, None, _) => refuse(
-            "sigma0_db",
+            column,
             "the cell is empty",
             format!("where nothing was detected write `left` in `censor` and {LIMIT}"),
         ),
         (Censor::Left | Censor::Right, Some(_), _) => {
-            let way_out = "leave sigma0_db empty there, or `censor`";
-            refuse("sigma0_db", "the row has a level and is censored", way_out.to_owned())
+            let way_out = format!("leave {column} empty there, or `censor`");
+            refuse(column, "the row has a level and is censored", way_out)
         }
         (Censor::Left | Censor::Right, None, None) => {
             refuse("threshold_db", "the cell is empty", format!("give {LIMIT}"))
@@ -195,10 +378,14 @@ fn stated(
 mod tests {
     use super::*;
 
+    fn ours() -> ColumnNames {
+        ColumnNames::default()
+    }
+
     const HEADER: &str = "theta_deg,sigma0_db,censor,threshold_db,censored\n";
 
     fn read(row: &str) -> Result<Vec<(usize, Observation)>, String> {
-        let read = points(format!("# head\n{HEADER}{row}\n").as_bytes());
+        let read = points(format!("# head\n{HEADER}{row}\n").as_bytes(), &ours());
         read.map(|points| points.rows).map_err(|error| error.to_string())
     }
 
@@ -233,7 +420,9 @@ mod tests {
 
     #[test]
     fn a_place_has_two_coordinates_or_none() {
-        let read = |row: &str| points(format!("theta_deg,sigma0_db,xt_m,yt_m\n{row}\n").as_bytes());
+        let read = |row: &str| {
+            points(format!("theta_deg,sigma0_db,xt_m,yt_m\n{row}\n").as_bytes(), &ours())
+        };
         assert_eq!(read("10,-3,0.1,-0.2").unwrap().rows[0].1.target_m, Some([0.1, -0.2]));
         assert_eq!(read("10,-3,,").unwrap().rows[0].1.target_m, None);
         for (row, column) in [("10,-3,0.1,", "yt_m"), ("10,-3,,0.1", "xt_m")] {
@@ -249,7 +438,9 @@ mod tests {
     fn how_the_target_was_lit_is_one_statement_for_all_rows() {
         let read = |rows: &str| {
             let text = format!("theta_deg,sigma0_db,footprint,beam_rad\n{rows}");
-            points(text.as_bytes()).map(|points| points.illumination).map_err(|e| e.to_string())
+            points(text.as_bytes(), &ours())
+                .map(|points| points.illumination)
+                .map_err(|e| e.to_string())
         };
         let lit = read("10,-3,projected,0.0117\n20,-4,projected,0.0117\n").unwrap();
         assert_eq!((lit.footprint, lit.beam_rad), (Some(Footprint::Projected), Some(0.0117)));
@@ -267,13 +458,77 @@ mod tests {
 
     #[test]
     fn a_published_table_is_read_when_it_has_one_curve() {
-        let read =
-            |rows: &str| points(format!("curve,kind,theta_deg,sigma0_db\n{rows}").as_bytes());
+        let read = |rows: &str| {
+            points(format!("curve,kind,theta_deg,sigma0_db\n{rows}").as_bytes(), &ours())
+        };
         assert_eq!(read("scan,measured,10,-3\nscan,measured,20,-4\n").unwrap().rows.len(), 2);
         let said = read("scan,measured,10,-3\nother,measured,20,-4\n").unwrap_err().to_string();
         assert!(
             said.starts_with("line 3, column curve: another curve begins here; keep"),
             "{said}"
         );
+    }
+
+    #[test]
+    fn angles_and_levels_have_several_names() {
+        let read = |text: &str| points(text.as_bytes(), &ours()).unwrap().rows[0].1;
+        let usual = read("theta_deg,sigma0_db\n30,-10\n");
+        for text in [
+            "grazing_deg,sigma0_db\n60,-10\n",
+            "theta_signed_deg;sigma0_db\n-30;-10,0\n",
+            "THETA_DEG\tSigma0\n30\t0.1\n",
+        ] {
+            let found = read(text);
+            assert!((found.theta_i_rad - usual.theta_i_rad).abs() < 1e-15, "{text}");
+            assert!((found.sigma0.unwrap() - 0.1).abs() < 1e-15, "{text}");
+        }
+        let names: ColumnNames = "inc=theta_deg,NRCS=sigma0".parse().unwrap();
+        let theirs = points(b"inc,NRCS,comment\n30,0.1,7\n", &names).unwrap();
+        assert_eq!(theirs.notices, ["these columns are passed over: comment"]);
+        assert!((theirs.rows[0].1.sigma0.unwrap() - 0.1).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_table_in_the_plane_of_incidence_is_a_bistatic_curve() {
+        let text = "theta_i_deg,theta_s_deg,brdf_per_sr\n30,-30,0.1\n30,60,0.2\n";
+        let rows = points(text.as_bytes(), &ours()).unwrap().rows;
+        let [(_, retro), (_, mirror)] = rows[..] else { panic!("two rows") };
+        assert!(retro.is_retro() && !mirror.is_retro());
+        assert!((retro.sigma0.unwrap() - 4.0 * PI * 0.1 * 0.75).abs() < 1e-14);
+        assert!((mirror.delta_phi_rad - PI).abs() < 1e-15);
+        let expected = 4.0 * PI * 0.2 * 0.75_f64.sqrt() * 0.5;
+        assert!((mirror.sigma0.unwrap() / expected - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_not_above_its_blank_is_a_limit() {
+        let text = "theta_deg,sigma0_db,blank_db\n10,-20,-50\n60,-51,-50\n";
+        let read = points(text.as_bytes(), &ours()).unwrap();
+        assert_eq!(read.notices, ["1 of 2 levels are not above their blank and count as limits"]);
+        let (_, last) = read.rows[1];
+        assert_eq!((last.censor, last.sigma0), (Censor::Left, None));
+        assert!((last.threshold_sigma0.unwrap() - 1e-5).abs() < 1e-15);
+        let plane =
+            "theta_i_deg,theta_s_deg,brdf_per_sr,blank_per_sr\n0,0,1,1e-6\n0,60,1e-6,1e-6\n";
+        let limit = points(plane.as_bytes(), &ours()).unwrap().rows[1].1.threshold_sigma0.unwrap();
+        assert!((limit / (4.0 * PI * 1e-6 * 0.5) - 1.0).abs() < 1e-12);
+        let all = points(b"theta_deg,sigma0_db,blank_db\n10,-20,-10\n", &ours()).unwrap_err();
+        assert!(all.to_string().contains("no level is above its blank"), "{all}");
+    }
+
+    #[test]
+    fn columns_that_say_too_much_or_too_little_are_named() {
+        for (text, said) in [
+            ("theta_deg,grazing_deg,sigma0_db\n10,80,-3\n", "both `theta_deg` and `grazing_deg`"),
+            ("theta_deg,sigma0_db,sigma0\n10,-3,0.5\n", "both `sigma0_db` and `sigma0`"),
+            ("theta,sigma0_db\n10,-3\n", "there is no column `theta_deg`; the columns are theta,"),
+            ("theta_deg,level\n10,-3\n", "there is no column `sigma0_db`"),
+            ("theta_deg,sigma0\n10,-0.5\n", "line 2, column sigma0: `-0.5` is not accepted here"),
+            ("theta_deg,theta_s_deg,brdf_per_sr\n1,2,3\n", "there is no column `theta_i_deg`"),
+            ("theta_deg,sigma0_db,only_detected\n1,2,yes\n", "column only_detected: `yes`"),
+        ] {
+            let error = points(text.as_bytes(), &ours()).unwrap_err().to_string();
+            assert!(error.contains(said), "{error}");
+        }
     }
 }

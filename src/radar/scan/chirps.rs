@@ -6,9 +6,6 @@ use crate::frames::{Global, Point, Ray};
 use crate::radar::frames::RadarFrames;
 use crate::radar::mirror::MirrorAngles;
 
-/// Range at which a pattern is drawn in the target plane, m (paper, Sec. III-B).
-pub const PATTERN_RANGE_M: f64 = 8.0;
-
 /// The chirps of a scan, in the order they are sent. All lists have one entry per chirp.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Chirps {
@@ -20,6 +17,8 @@ pub struct Chirps {
     pub rays: Vec<Ray<Global>>,
     /// The mirror's angles, for scans that a mirror makes; empty otherwise.
     pub mirror: Vec<MirrorAngles>,
+    /// Whether these are only the chirps that were detected, and nothing is known of the silent ones.
+    pub only_detected: bool,
     /// What a person should know of the file the chirps came from.
     pub notices: Vec<String>,
 }
@@ -56,11 +55,12 @@ impl Chirps {
         self.time_s.windows(2).any(|pair| pair[0] != pair[1])
     }
 
-    /// (x_t, y_t) of each ray at 8 m from its origin, m.
+    /// (x_t, y_t) of each ray at the range of the pattern from its origin, m.
     pub fn target_points_m(&self, frames: &RadarFrames) -> impl Iterator<Item = DVec2> {
         let target_from_global = frames.global_from_target.inverse();
+        let range_m = frames.pattern_range_m;
         self.rays.iter().map(move |ray| {
-            let point = Point::from(ray.origin.xyz + PATTERN_RANGE_M * ray.direction.xyz());
+            let point = Point::from(ray.origin.xyz + range_m * ray.direction.xyz());
             (target_from_global * point).xyz.truncate()
         })
     }

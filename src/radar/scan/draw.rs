@@ -1,11 +1,12 @@
 //! Drawing a pattern: one ray per chirp.
 
+use glam::DVec3;
 use rayon::prelude::*;
 
-use super::chirps::{Chirps, PATTERN_RANGE_M};
+use super::chirps::Chirps;
 use super::explicit;
 use super::pattern::{Explicit, Pattern};
-use crate::frames::{Global, Point, Ray, target_z_m};
+use crate::frames::{Direction, Global, Point, Ray, target_z_m};
 use crate::radar::error::RadarError;
 use crate::radar::f5::{Domain, F5};
 use crate::radar::frames::RadarFrames;
@@ -28,13 +29,17 @@ impl Chirps {
                 Ok(Chirps::timed(radar, rays, angles))
             }
             Pattern::Raster(pattern) => Chirps::through(radar, &pattern.target_points_m()),
+            Pattern::AngularRaster(pattern) => Ok(Chirps::towards(radar, &pattern.directions())),
             Pattern::Lissajous(pattern) => Chirps::through(radar, &pattern.target_points_m()),
             Pattern::Spiral(pattern) => Chirps::through(radar, &pattern.target_points_m()),
-            Pattern::Rays(Explicit { file }) => explicit::rays(file, &fetch(file, read)?),
-            Pattern::Angles(Explicit { file }) => {
+            Pattern::Rays(Explicit { file, complete }) => {
+                let chirps = explicit::rays(file, &fetch(file, read)?)?;
+                Ok(Chirps { only_detected: !complete, ..chirps })
+            }
+            Pattern::Angles(Explicit { file, complete }) => {
                 let mut chirps = explicit::angles(file, &fetch(file, read)?)?;
                 chirps.rays = through_mirror(radar, &chirps.mirror)?;
-                Ok(chirps)
+                Ok(Chirps { only_detected: !complete, ..chirps })
             }
         }
     }
@@ -45,6 +50,16 @@ impl Chirps {
         Ok(Chirps::timed(radar, rays, Vec::new()))
     }
 
+    /// Chirps without a mirror in directions of the target frame.
+    fn towards(radar: &Radar, directions: &[DVec3]) -> Chirps {
+        let frames = radar.frames();
+        let (origin, turn) = (frames.origin(), frames.global_from_target.rotation());
+        let rays = directions.iter().filter_map(|direction| {
+            Some(Ray { origin, direction: Direction::new(turn * *direction)? })
+        });
+        Chirps::timed(radar, rays.collect(), Vec::new())
+    }
+
     /// Chirps numbered from 0, one period apart.
     fn timed(radar: &Radar, rays: Vec<Ray<Global>>, mirror: Vec<MirrorAngles>) -> Chirps {
         Chirps {
@@ -52,6 +67,7 @@ impl Chirps {
             time_s: (0..rays.len()).map(|n| n as f64 * radar.chirp_period_s).collect(),
             rays,
             mirror,
+            only_detected: false,
             notices: Vec::new(),
         }
     }
@@ -79,11 +95,12 @@ impl Radar {
     pub fn f5_domain(&self, angles: &[MirrorAngles]) -> Domain {
         // Without any tilt a milliradian keeps the fit well posed.
         let gamma_rad = angles.iter().map(|a| a.gamma_rad.abs()).fold(1e-3, f64::max);
-        Domain { gamma_rad, range_m: [0.75, 1.25].map(|share| share * PATTERN_RANGE_M) }
+        let pattern_range_m = self.frames().pattern_range_m;
+        Domain { gamma_rad, range_m: [0.75, 1.25].map(|share| share * pattern_range_m) }
     }
 }
 
-/// Rays through points of the target plane at R = 8 m.
+/// Rays through points of the target plane at the range of the pattern.
 fn through_points(
     frames: &RadarFrames,
     points: &[[f64; 2]],
@@ -91,7 +108,7 @@ fn through_points(
     let origin = frames.origin();
     let mut rays = Vec::with_capacity(points.len());
     for (chirp, &[xt_m, yt_m]) in points.iter().enumerate() {
-        let range_m = PATTERN_RANGE_M;
+        let range_m = frames.pattern_range_m;
         let direction = target_z_m(xt_m, yt_m, range_m, frames.reflector_centre)
             .map(|zt_m| frames.global_from_target * Point::new(xt_m, yt_m, zt_m))
             .and_then(|point| origin.towards(point))
@@ -101,12 +118,13 @@ fn through_points(
     Ok(rays)
 }
 
-/// Rays of mirror angles: equation (1) at R = 8 m, then (2) to (4).
+/// Rays of mirror angles: equation (1) at the range of the pattern, then (2) to (4).
 fn through_mirror(radar: &Radar, angles: &[MirrorAngles]) -> Result<Vec<Ray<Global>>, RadarError> {
     let f5 = radar.f5(radar.f5_domain(angles))?;
-    let points: Vec<[f64; 2]> =
-        angles.par_iter().map(|&angles| f5.target_point_m(angles, PATTERN_RANGE_M)).collect();
-    through_points(&radar.frames(), &points)
+    let frames = radar.frames();
+    let target_point_m = |angles: &MirrorAngles| f5.target_point_m(*angles, frames.pattern_range_m);
+    let points: Vec<[f64; 2]> = angles.par_iter().map(target_point_m).collect();
+    through_points(&frames, &points)
 }
 
 fn fetch(
@@ -119,7 +137,7 @@ fn fetch(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::radar::scan::{Field, Raster, Spiral};
+    use crate::radar::scan::{Field, PATTERN_RANGE_M, Raster, Spiral};
 
     fn draw(scan: Pattern) -> Result<Chirps, RadarError> {
         Chirps::draw(&Radar { scan, ..Default::default() }, |_| Err("no file".to_owned()))
@@ -169,7 +187,8 @@ mod tests {
 
     #[test]
     fn an_explicit_scan_needs_its_file() {
-        let refused = draw(Pattern::Rays(Explicit { file: "rays.csv".into() })).unwrap_err();
+        let refused =
+            draw(Pattern::Rays(Explicit { file: "rays.csv".into(), complete: true })).unwrap_err();
         assert!(refused.to_string().contains("rays.csv"), "{refused}");
     }
 }

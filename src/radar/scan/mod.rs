@@ -5,5 +5,6 @@ mod draw;
 mod explicit;
 pub(super) mod pattern;
 
-pub use chirps::{Chirps, Field, PATTERN_RANGE_M};
-pub use pattern::{Elliptical, Explicit, Lissajous, Pattern, Raster, Spiral};
+pub use super::frames::PATTERN_RANGE_M;
+pub use chirps::{Chirps, Field};
+pub use pattern::{AngularRaster, Elliptical, Explicit, Lissajous, Pattern, Raster, Spiral};

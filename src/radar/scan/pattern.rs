@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use glam::DVec3;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -23,6 +24,8 @@ pub enum Pattern {
     Elliptical(Elliptical),
     /// Lines from left to right.
     Raster(Raster),
+    /// Lines from left to right, evenly spaced in angle.
+    AngularRaster(AngularRaster),
     /// Two sines.
     Lissajous(Lissajous),
     /// Outwards from the middle, evenly dense.
@@ -58,6 +61,20 @@ pub struct Raster {
     pub width_m: f64,
     /// Height at 8 m, m.
     pub height_m: f64,
+}
+
+/// Lines from left to right and, every other one, back; from the bottom to the top: directions about the line of sight.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AngularRaster {
+    /// Number of lines.
+    pub lines: usize,
+    /// Chirps on each line.
+    pub chirps_per_line: usize,
+    /// Azimuth of the first and the last chirp of a line, degrees, to the right of the line of sight.
+    pub azimuth_deg: [f64; 2],
+    /// Elevation of the first and the last line, degrees, above the line of sight.
+    pub elevation_deg: [f64; 2],
 }
 
 /// x and y swing as sines of their own frequencies.
@@ -96,6 +113,17 @@ pub struct Spiral {
 pub struct Explicit {
     /// Path of the CSV, relative to the scene's folder.
     pub file: String,
+    /// Whether it has every chirp, so that one without a detection was silent. false: only chirps that were detected.
+    #[serde(default = "yes", skip_serializing_if = "is_yes")]
+    pub complete: bool,
+}
+
+fn yes() -> bool {
+    true
+}
+
+fn is_yes(yes: &bool) -> bool {
+    *yes
 }
 
 impl Default for Elliptical {
@@ -107,6 +135,18 @@ impl Default for Elliptical {
 impl Default for Raster {
     fn default() -> Self {
         Raster { lines: 181, chirps_per_line: 101, width_m: 0.5, height_m: 0.9 }
+    }
+}
+
+impl Default for AngularRaster {
+    /// The field of view of [`Raster`].
+    fn default() -> Self {
+        AngularRaster {
+            lines: 181,
+            chirps_per_line: 101,
+            azimuth_deg: [-1.8, 1.8],
+            elevation_deg: [-3.2, 3.2],
+        }
     }
 }
 
@@ -156,6 +196,21 @@ impl Pattern {
                 size("scan.width_m", r.width_m),
                 size("scan.height_m", r.height_m),
             ],
+            Pattern::AngularRaster(r) => {
+                let angle = |name, degrees: f64, most: f64| (name, degrees, (-most, most));
+                vec![
+                    chirps("scan.lines", r.lines),
+                    chirps("scan.chirps_per_line", r.chirps_per_line),
+                    chirps(
+                        "scan.lines × scan.chirps_per_line",
+                        r.lines.saturating_mul(r.chirps_per_line),
+                    ),
+                    angle("scan.azimuth_deg[0]", r.azimuth_deg[0], 180.0),
+                    angle("scan.azimuth_deg[1]", r.azimuth_deg[1], 180.0),
+                    angle("scan.elevation_deg[0]", r.elevation_deg[0], 90.0),
+                    angle("scan.elevation_deg[1]", r.elevation_deg[1], 90.0),
+                ]
+            }
             Pattern::Lissajous(l) => vec![
                 chirps("scan.chirps", l.chirps),
                 size("scan.width_m", l.width_m),
@@ -205,6 +260,32 @@ impl Raster {
         }
         points_m
     }
+}
+
+impl AngularRaster {
+    /// Directions in the target frame, whose z goes back along the line of sight.
+    pub(super) fn directions(&self) -> Vec<DVec3> {
+        let mut directions = Vec::with_capacity(self.lines * self.chirps_per_line);
+        for (number, line) in steps(self.lines).enumerate() {
+            let (up, ahead) = between(self.elevation_deg, line).to_radians().sin_cos();
+            for step in steps(self.chirps_per_line) {
+                // Every other line runs backwards.
+                let along = if number.is_multiple_of(2) { step } else { 1.0 - step };
+                let (right, on) = between(self.azimuth_deg, along).to_radians().sin_cos();
+                directions.push(DVec3::new(ahead * right, up, -ahead * on));
+            }
+        }
+        directions
+    }
+}
+
+/// From 0 to 1 in `count` steps, both ends among them; the middle for one.
+fn steps(count: usize) -> impl Iterator<Item = f64> {
+    (0..count).map(move |step| if count == 1 { 0.5 } else { step as f64 / (count - 1) as f64 })
+}
+
+fn between([from, to]: [f64; 2], share: f64) -> f64 {
+    from + share * (to - from)
 }
 
 impl Lissajous {
@@ -259,6 +340,30 @@ mod tests {
         let points =
             Raster { lines: 2, chirps_per_line: 2, width_m: 4.0, height_m: 4.0 }.target_points_m();
         assert_eq!(points, [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]);
+    }
+
+    #[test]
+    fn an_angular_raster_goes_from_angle_to_angle() {
+        let raster = AngularRaster {
+            lines: 3,
+            chirps_per_line: 2,
+            azimuth_deg: [-30.0, 90.0],
+            elevation_deg: [0.0, 90.0],
+        };
+        let directions = raster.directions();
+        let expected = [
+            DVec3::new(-0.5, 0.0, -0.75_f64.sqrt()),
+            DVec3::X,
+            DVec3::new(0.5_f64.sqrt(), 0.5_f64.sqrt(), 0.0),
+        ];
+        for (found, expected) in std::iter::zip(&directions, expected) {
+            assert!(found.distance(expected) < 1e-12, "{found}");
+        }
+        assert!(directions[4].distance(DVec3::Y) < 1e-12 && directions.len() == 6);
+        let one = AngularRaster { lines: 1, chirps_per_line: 1, ..raster };
+        let middle =
+            DVec3::new(0.5 * 0.5_f64.sqrt(), 0.5_f64.sqrt(), -0.75_f64.sqrt() * 0.5_f64.sqrt());
+        assert!(one.directions()[0].distance(middle) < 1e-12);
     }
 
     #[test]

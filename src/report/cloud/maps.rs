@@ -3,7 +3,7 @@
 use super::models::shown;
 use super::outline::Outline;
 use super::places::strongest;
-use super::raster::{CHANNEL, Pick, empty, filled, pixel_m};
+use super::raster::{CHANNEL, Pick, Plane, empty, filled, pixel_m};
 use crate::diagnose::{Errors, Report};
 use crate::formats::figure::drawing::{Drawing, Shape};
 use crate::formats::figure::{Figure, FigureError, Scale};
@@ -40,7 +40,7 @@ struct Panel {
 }
 
 /// Observed − predicted, dB, of what was detected.
-pub(super) fn residuals(report: &Report, spot_m: f64) -> Result<Picture, FigureError> {
+pub(super) fn residuals(report: &Report, plane: Plane) -> Result<Picture, FigureError> {
     let subject = Subject {
         file: "residual-map",
         title: "Residual over the target",
@@ -56,7 +56,7 @@ pub(super) fn residuals(report: &Report, spot_m: f64) -> Result<Picture, FigureE
         |row| Some(db_from_ratio(row.observed_w? / row.before_w)),
         |row| Some(db_from_ratio(row.observed_w? / row.after_w)),
     ];
-    maps(&subject, report, spot_m, before_after(report, notes, picks))
+    maps(&subject, report, plane, before_after(report, notes, picks))
 }
 
 fn error_note(errors: &Errors) -> String {
@@ -64,7 +64,7 @@ fn error_note(errors: &Errors) -> String {
 }
 
 /// Mean quantile residual, which chirps without a detection have, too.
-pub(super) fn quantiles(report: &Report, spot_m: f64) -> Result<Picture, FigureError> {
+pub(super) fn quantiles(report: &Report, plane: Plane) -> Result<Picture, FigureError> {
     let subject = Subject {
         file: "quantile-map",
         title: "Quantile residual over the target",
@@ -81,7 +81,7 @@ pub(super) fn quantiles(report: &Report, spot_m: f64) -> Result<Picture, FigureE
         quantile_note(report.rows.iter().map(|row| row.z_after)),
     ];
     let picks: [Pick; 2] = [|row| Some(row.z_before), |row| Some(row.z_after)];
-    maps(&subject, report, spot_m, before_after(report, notes, picks))
+    maps(&subject, report, plane, before_after(report, notes, picks))
 }
 
 fn quantile_note(z: impl ExactSizeIterator<Item = f64> + Clone) -> String {
@@ -92,7 +92,7 @@ fn quantile_note(z: impl ExactSizeIterator<Item = f64> + Clone) -> String {
 }
 
 /// The smooth term that the final model lacks; without panels where there is none.
-pub(super) fn unknown(report: &Report, spot_m: f64) -> Result<Picture, FigureError> {
+pub(super) fn unknown(report: &Report, plane: Plane) -> Result<Picture, FigureError> {
     let subject = Subject {
         file: "unknown-map",
         title: "What is unknown, over the target",
@@ -112,10 +112,10 @@ pub(super) fn unknown(report: &Report, spot_m: f64) -> Result<Picture, FigureErr
     let rms_db = (squares / report.rows.len().max(1) as f64).sqrt();
     let note = format!("rms {rms_db:.2} dB over all chirps");
     let panel = Panel { title, note, pick: |row| Some(row.unknown_db) };
-    let mut picture = maps(&subject, report, spot_m, vec![panel])?;
-    let raster = empty(&report.rows, pixel_m(&report.rows, spot_m));
+    let mut picture = maps(&subject, report, plane, vec![panel])?;
+    let raster = empty(&report.rows, pixel_m(&report.rows, plane.spot_m));
     for map in &mut picture.panels {
-        for place in strongest(&report.rows, spot_m) {
+        for place in strongest(&report.rows, plane.spot_m) {
             let radius_m = 1.5 * raster.pixel_m;
             let ring = Outline::Ring { x_m: place.x_m, y_m: place.y_m, radius_m };
             let ring = ring.on(map, &raster);
@@ -143,17 +143,17 @@ fn before_after(report: &Report, notes: [String; 2], picks: [Pick; 2]) -> Vec<Pa
 fn maps(
     subject: &Subject,
     report: &Report,
-    spot_m: f64,
+    plane: Plane,
     panels: Vec<Panel>,
 ) -> Result<Picture, FigureError> {
-    let around = empty(&report.rows, pixel_m(&report.rows, spot_m));
+    let around = empty(&report.rows, pixel_m(&report.rows, plane.spot_m));
     let mut rasters: Vec<Raster> = Vec::new();
     for panel in &panels {
         rasters.push(filled(&around, &report.rows, panel.pick));
     }
     let mut outlines: Vec<Outline> = Vec::new();
     for found in &report.effects {
-        outlines.extend(Outline::new(found, &report.rows));
+        outlines.extend(Outline::new(found, &report.rows, plane.range_m));
     }
     let reach = rasters.first().map_or(0.0, |first| reach(first, subject.reach, subject.share));
     let mut maps = Vec::new();

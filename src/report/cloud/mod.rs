@@ -18,6 +18,7 @@ mod trends;
 
 use std::path::Path;
 
+use self::raster::Plane;
 use super::json::json_file;
 use super::picture::Picture;
 use super::residuals;
@@ -42,8 +43,9 @@ pub struct CloudReport<'a> {
 impl<'a> CloudReport<'a> {
     /// Draws the pictures of a diagnosis.
     pub fn new(answer: CloudAnswer<'a>) -> CloudReport<'a> {
-        let spot_m = answer.scene.radar().spot_fwhm_m();
-        let (pictures, notices) = pictures::pictures(answer.report, spot_m);
+        let radar = answer.scene.radar();
+        let (spot_m, range_m) = (radar.spot_fwhm_m(), radar.frames().pattern_range_m);
+        let (pictures, notices) = pictures::pictures(answer.report, Plane { spot_m, range_m });
         let peaks = places::strongest(&answer.report.rows, spot_m);
         CloudReport { answer, pictures, peaks, notices }
     }

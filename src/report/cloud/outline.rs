@@ -6,7 +6,6 @@ use crate::diagnose::{FoundEffect, Row};
 use crate::effects::Place;
 use crate::formats::figure::drawing::{Drawing, Shape};
 use crate::geometry::Raster;
-use crate::radar::scan::PATTERN_RANGE_M;
 
 /// Where an effect acts, in the target plane.
 #[derive(Clone, Copy)]
@@ -18,16 +17,16 @@ pub(super) enum Outline {
 }
 
 impl Outline {
-    /// The outline of an effect; `None` where it acts everywhere.
-    pub fn new(found: &FoundEffect, rows: &[Row]) -> Option<Outline> {
+    /// The outline of an effect on a target plane at a range, m; `None` where it acts everywhere.
+    pub fn new(found: &FoundEffect, rows: &[Row], plane_m: f64) -> Option<Outline> {
         match found.place? {
             Place::Beyond { off_m, direction_deg } => Some(Outline::Line { off_m, direction_deg }),
             Place::Round { x_m, y_m, radius_m } => {
                 let nearest = rows
                     .iter()
                     .min_by(|a, b| distance_m(a, x_m, y_m).total_cmp(&distance_m(b, x_m, y_m)))?;
-                // The radius is one on the surface; the target plane is at the range of the pattern.
-                let radius_m = radius_m * PATTERN_RANGE_M / nearest.range_m;
+                // The radius is one on the surface.
+                let radius_m = radius_m * plane_m / nearest.range_m;
                 Some(Outline::Ring { x_m, y_m, radius_m })
             }
         }

@@ -1,15 +1,16 @@
 //! The pictures of a diagnosis.
 
+use super::raster::Plane;
 use super::{bars, maps, quantiles, trends};
 use crate::diagnose::Report;
 use crate::report::picture::Picture;
 
 /// All pictures, the most informative first, and a sentence for each that cannot be drawn.
-pub(super) fn pictures(report: &Report, spot_m: f64) -> (Vec<Picture>, Vec<String>) {
+pub(super) fn pictures(report: &Report, plane: Plane) -> (Vec<Picture>, Vec<String>) {
     let drawn = [
-        maps::residuals(report, spot_m),
-        maps::quantiles(report, spot_m),
-        maps::unknown(report, spot_m),
+        maps::residuals(report, plane),
+        maps::quantiles(report, plane),
+        maps::unknown(report, plane),
         trends::picture(report),
         quantiles::picture(report),
         bars::ranking(report),

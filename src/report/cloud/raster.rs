@@ -13,6 +13,15 @@ const SHOTS_PER_PIXEL: f64 = 8.0;
 /// A value of a shot; none where it has no such value.
 pub(super) type Pick = fn(&Row) -> Option<f64>;
 
+/// The target plane of a radar.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Plane {
+    /// Diameter of the spot, m.
+    pub spot_m: f64,
+    /// Range of the plane, m.
+    pub range_m: f64,
+}
+
 /// Side of a pixel, m: a spot, or more where the scan is sparse.
 pub(super) fn pixel_m(rows: &[Row], spot_m: f64) -> f64 {
     let mut cells: Vec<[i64; 2]> = Vec::with_capacity(rows.len());

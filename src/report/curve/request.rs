@@ -5,6 +5,7 @@ use std::path::Path;
 use crate::brdf::Brdf;
 use crate::diagnose::curve::{CurveDiagnosis, CurveReport, Points, Term, base_law};
 use crate::error::Error;
+use crate::formats::ColumnNames;
 use crate::measure::{Curve, in_plane};
 
 /// What to diagnose.
@@ -12,6 +13,8 @@ use crate::measure::{Curve, in_plane};
 pub struct CurveRequest<'a> {
     /// The curve's file: `.bsdf`, a table in the plane of incidence, or a backscatter curve.
     pub path: &'a Path,
+    /// Our names for its columns.
+    pub columns: &'a ColumnNames,
     /// The law to compare the curve with, from which the refit begins; one GGX lobe over Lambert for `None`.
     pub law: Option<&'a Brdf>,
     /// Noise of the levels, dB; from repeats, the file or neighbouring angles for `None`.
@@ -23,29 +26,34 @@ pub struct CurveRequest<'a> {
 }
 
 impl CurveRequest<'_> {
-    /// Diagnoses the curve; `bytes` is the content of its file.
+    /// Diagnoses the curve; `bytes` is the content of its file. Also what a person should know of the file.
     ///
     /// # Errors
     /// [`Error::CurveFile`] for bytes that are not a curve, [`Error::CurveDiagnosis`] for a curve of which nothing
     /// can be said.
-    pub fn diagnose(&self, bytes: &[u8]) -> Result<CurveReport, Error> {
-        let points = self.points(bytes)?;
+    pub fn diagnose(&self, bytes: &[u8]) -> Result<(CurveReport, Vec<String>), Error> {
+        let (points, notices) = self.points(bytes)?;
         let law = self.law.cloned().unwrap_or_else(base_law);
         let diagnosis = CurveDiagnosis { seed: self.seed, ..CurveDiagnosis::default() };
-        diagnosis.run(&points, &law, self.effects).map_err(|error| Error::CurveDiagnosis {
-            curve: self.path.display().to_string(),
-            error,
-        })
+        match diagnosis.run(&points, &law, self.effects) {
+            Ok(report) => Ok((report, notices)),
+            Err(error) => {
+                Err(Error::CurveDiagnosis { curve: self.path.display().to_string(), error })
+            }
+        }
     }
 
-    fn points(&self, bytes: &[u8]) -> Result<Points, Error> {
+    fn points(&self, bytes: &[u8]) -> Result<(Points, Vec<String>), Error> {
         let is_bsdf = self.path.extension().is_some_and(|end| end.eq_ignore_ascii_case("bsdf"));
+        let noise_db = self.noise_db;
         let points = if is_bsdf {
-            in_plane::read_bsdf(bytes).map(|table| Points::in_plane(&table, self.noise_db))
-        } else if in_plane::is_table(bytes) {
-            in_plane::read_table(bytes).map(|table| Points::in_plane(&table, self.noise_db))
+            in_plane::read_bsdf(bytes).map(|table| (Points::in_plane(&table, noise_db), Vec::new()))
+        } else if in_plane::is_table(bytes, self.columns) {
+            in_plane::read_table(bytes, self.columns)
+                .map(|(table, notices)| (Points::in_plane(&table, noise_db), notices))
         } else {
-            Curve::read(bytes).map(|curve| Points::backscatter(&curve, self.noise_db))
+            Curve::read_as(bytes, self.columns)
+                .map(|(curve, notices)| (Points::backscatter(&curve, noise_db), notices))
         };
         points.map_err(|error| Error::CurveFile { file: self.path.to_owned(), error })
     }

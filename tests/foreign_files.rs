@@ -1,0 +1,314 @@
+//! Other people's clouds and curves, by the program: from a file with columns of its own to a fitted material.
+
+mod support;
+
+use std::fs;
+use std::io::Cursor;
+use std::path::Path;
+
+use matdb::formats::{PointFormat, PointTable};
+use support::matdb;
+
+/// A scene of a ball that another radar looks at, from its own place; speckle of four looks and an error of range.
+const SCENE: &str = r#"
+name = "Another radar"
+seed = 5
+
+[radar]
+position_m = [0.4, 1.3, 3.0]
+look_at_m = [0.0, 1.0, 0.0]
+threshold_dbm = -68.0
+spot_diameter_m = 0.008
+
+[radar.beam]
+focus_m = 3.06
+
+[radar.scan]
+pattern = "angular-raster"
+lines = 90
+chirps_per_line = 90
+azimuth_deg = [-4.2, 4.2]
+elevation_deg = [-4.2, 4.2]
+
+[radar.speckle]
+looks = 4
+form = "independent"
+
+[radar.noise]
+level_dbm = -100
+range_sd_m = 0.002
+
+[[mesh]]
+name = "ball"
+file = "builtin:sphere"
+size_m = [0.4, 0.4, 0.4]
+translation_m = [0, 1, 0]
+
+[[region]]
+name = "paint"
+material = "mannequin-paint"
+"#;
+
+/// Places and powers of what the radar detects.
+fn detections(folder: &Path) -> Vec<[f64; 5]> {
+    fs::write(folder.join("theirs.toml"), SCENE).unwrap();
+    matdb(folder).args(["render", "theirs.toml", "-o", "out", "-q"]).assert().success();
+    let bytes = fs::read(folder.join("out/cloud.ply")).unwrap();
+    let table = PointTable::read(PointFormat::Ply, &bytes).unwrap();
+    let column = |name| table.column(name).unwrap().unwrap();
+    let columns = ["x", "y", "z", "power_dbm", "range_m"].map(column);
+    (0..table.len()).map(|row| [0, 1, 2, 3, 4].map(|at| columns[at][row])).collect()
+}
+
+/// As `numpy.savetxt` writes it.
+fn xyz(points: &[[f64; 5]]) -> String {
+    let lines = points
+        .iter()
+        .map(|[x, y, z, level, _]| format!("{x:.18e} {y:.18e} {z:.18e} {level:.18e}\n"));
+    "X Y Z Intensity\n".to_owned() + &lines.collect::<String>()
+}
+
+/// What the program prints, or its error.
+fn said(folder: &Path, arguments: &str) -> String {
+    let output = matdb(folder).args(arguments.split(' ')).output().unwrap();
+    String::from_utf8([output.stdout, output.stderr].concat()).unwrap()
+}
+
+fn refused(folder: &Path, arguments: &str) -> String {
+    let output = matdb(folder).args(arguments.split(' ')).output().unwrap();
+    assert!(!output.status.success(), "{arguments}");
+    String::from_utf8(output.stderr).unwrap()
+}
+
+/// An estimate of a fit, and its standard deviation.
+fn estimate(fit: &serde_json::Value, name: &str) -> [f64; 2] {
+    let estimates = fit["estimates"].as_array().unwrap();
+    let found = estimates.iter().find(|estimate| estimate["name"] == name).unwrap();
+    ["value", "sd"].map(|key| found[key].as_f64().unwrap())
+}
+
+#[test]
+fn three_steps_lead_from_a_foreign_cloud_to_a_curve() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let points = detections(at);
+    fs::write(at.join("scan.xyz"), xyz(&points)).unwrap();
+    let mesh = "--mesh builtin:sphere";
+    let columns = "--columns Intensity=power_dbm";
+    let unknown = refused(at, &format!("new scene --cloud scan.xyz {columns} {mesh}"));
+    assert!(
+        unknown.contains("0 of the points have a range") && unknown.contains("--radar-at"),
+        "{unknown}"
+    );
+    let new = format!("new scene --cloud scan.xyz {columns} {mesh} --radar-at 0.4,1.3,3");
+    let made = said(at, &new);
+    assert!(made.contains("0.400, 1.300, 3.000 m (as given)"), "{made}");
+    assert!(made.contains("beside the mesh"), "the ball of a metre stands at the origin: {made}");
+    let again = refused(at, &new);
+    assert!(again.contains("scene.toml exists already"), "{again}");
+    // What a person changes: size and place of the ball, the beam, and that rays are single.
+    let scene = fs::read_to_string(at.join("scene.toml")).unwrap();
+    assert!(
+        scene.contains("complete = false") && scene.contains("position_m = [0.4, 1.3, 3]"),
+        "{scene}"
+    );
+    let changed = scene
+        .replace("rays = 16 ", "rays = 1 ")
+        .replace("# spot_diameter_m = 0.016", "spot_diameter_m = 0.008")
+        .replace("file = \"builtin:sphere\"", "file = \"builtin:sphere\"\nsize_m = [0.4, 0.4, 0.4]")
+        .replace("# translation_m = [0, 0, 0]", "translation_m = [0, 1, 0]");
+    fs::write(at.join("scene.toml"), changed).unwrap();
+    let measured = said(
+        at,
+        &format!("measure scan.xyz {columns} --scene scene.toml --exact-mesh -o measured"),
+    );
+    assert!(measured.contains("and 0 censored chirps"), "{measured}");
+    let curve = fs::read_to_string(at.join("measured/curve.csv")).unwrap();
+    assert!(
+        curve.starts_with("theta_deg,")
+            && curve.lines().next().unwrap().contains("threshold_db,footprint")
+    );
+    let fit = said(at, "fit measured/curve.csv --noise-dbm -100 --json -q");
+    let fit: serde_json::Value = serde_json::from_str(&fit).unwrap();
+    for (name, truth) in [("diffuse.alpha", 3.0), ("looks", 4.0)] {
+        let [value, sd] = estimate(&fit, name);
+        assert!((value - truth).abs() < 4.0 * sd, "{name}: {value} ± {sd}");
+    }
+}
+
+#[test]
+fn every_format_and_a_known_range_give_the_same_place_and_cloud() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let points = detections(at);
+    let mut csv = "chirp;X;Y;Z;Level;Range\n".to_owned();
+    let mut pcd = format!(
+        "VERSION 0.7\nFIELDS x y z intensity range_m\nSIZE 8 8 8 4 8\nTYPE F F F F F\nWIDTH {0}\nHEIGHT 1\nPOINTS {0}\nDATA ascii\n",
+        points.len()
+    );
+    let mut builder = las::Builder::from((1, 4));
+    builder.point_format =
+        las::point::Format { is_compressed: true, ..las::point::Format::new(1).unwrap() };
+    builder.transforms.x.scale = 1e-6;
+    builder.transforms.y.scale = 1e-6;
+    builder.transforms.z.scale = 1e-6;
+    let mut writer =
+        las::Writer::new(Cursor::new(Vec::new()), builder.into_header().unwrap()).unwrap();
+    for (chirp, [x, y, z, level, range]) in points.iter().enumerate() {
+        let comma = |number: &f64| format!("{:.4}", 1e3 * number).replace('.', ",");
+        csv += &format!(
+            "{chirp};{};{};{};{};{}\n",
+            comma(x),
+            comma(y),
+            comma(z),
+            format!("{level:.5}").replace('.', ","),
+            comma(range)
+        );
+        pcd += &format!("{x} {y} {z} {level} {range}\n");
+        // Ten counts for each dB above −100 dBm would be a logarithm; a radar's counts are powers.
+        let intensity = (10f64.powf(0.1 * (level + 68.0)) * 100.0).round().min(65535.0) as u16;
+        let point = las::Point {
+            x: *x,
+            y: *y,
+            z: *z,
+            intensity,
+            gps_time: Some(0.0),
+            ..las::Point::default()
+        };
+        writer.write_point(point).unwrap();
+    }
+    fs::write(at.join("scan.csv"), csv).unwrap();
+    fs::write(at.join("scan.pcd"), pcd).unwrap();
+    fs::write(at.join("scan.laz"), writer.into_inner().unwrap().into_inner()).unwrap();
+    let mesh = "--mesh builtin:sphere";
+    let names = "--columns X=x_mm,Y=y_mm,Z=z_mm,Range=range_mm,Level=power_dbm";
+    let csv = said(at, &format!("new scene --cloud scan.csv {names} {mesh} -o a.toml"));
+    let pcd = said(
+        at,
+        &format!("new scene --cloud scan.pcd --columns intensity=power_dbm {mesh} -o b.toml"),
+    );
+    for (said, file) in [(csv, "a.toml"), (pcd, "b.toml")] {
+        assert!(said.contains("0.400, 1.300, 3.000 m (found from the ranges"), "{file}: {said}");
+    }
+    let far = refused(
+        at,
+        &format!(
+            "new scene --cloud scan.pcd --columns intensity=power_dbm {mesh} --radar-at 0,0,0 -o c.toml"
+        ),
+    );
+    assert!(far.contains("its ranges differ from the distances to --radar-at by"), "{far}");
+    // Counts have no level, so that the curve has none.
+    let ball = SCENE.replace("name = \"Another radar\"", "name = \"counts\"");
+    fs::write(at.join("counts.toml"), ball).unwrap();
+    let measure = "measure scan.laz --columns intensity=power_counts,gps_time=- --scene counts.toml --exact-mesh -o counts";
+    let measured = said(at, measure);
+    assert!(!measured.contains("error"), "{measured}");
+    let curve = fs::read_to_string(at.join("counts/curve.csv")).unwrap();
+    assert!(curve.lines().next().unwrap().ends_with(",relative"), "{}", &curve[..200]);
+    let fit = said(at, "fit counts/curve.csv --json -q");
+    let fit: serde_json::Value = serde_json::from_str(&fit).unwrap();
+    let [alpha, sd] = estimate(&fit, "diffuse.alpha");
+    assert!((alpha - 3.0).abs() < 4.0 * sd, "{alpha} ± {sd}");
+    assert!(fit["sentences"].to_string().contains("the levels are relative"), "{fit}");
+    for command in [
+        "compare scan.laz --columns intensity=power_counts --scene counts.toml --pose 0,0,0 -o no",
+        "diagnose scan.laz --columns intensity=power_counts --scene counts.toml -o no",
+        "near --curve counts/curve.csv",
+    ] {
+        let said = refused(at, command);
+        assert!(said.contains("are relative"), "{command}: {said}");
+    }
+}
+
+#[test]
+fn clouds_that_say_too_little_or_too_much_are_refused_with_the_way_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("scene.toml"), SCENE).unwrap();
+    for (name, text, flags, expected) in [
+        (
+            "a.csv",
+            "X,Y,Z,I\n1,2,3,-60\n",
+            "",
+            "no column power_dbm; it has: x, y, z, i; say which it is by --columns THEIRS=power_dbm",
+        ),
+        (
+            "b.csv",
+            "x,y,z,power_dbm,power_w\n1,2,3,-60,1e-9\n",
+            "",
+            "both power_dbm and power_w; pass one over",
+        ),
+        (
+            "c.csv",
+            "x,y,z,power\n1,2,3,-60\n",
+            " --columns pover=power_dbm",
+            "no column `pover`; did you mean `power`?",
+        ),
+        (
+            "d.csv",
+            "x,y,z,power\n1,2,3,-60\n",
+            " --columns power=power_dbm,power=chirp",
+            "gets two names",
+        ),
+        ("e.csv", "x,x,z,power\n1,2,3,-60\n", "", "column `x` is there twice"),
+        ("f.csv", "x,y,z,power\n1,2,3,\n", "", "line 2, column power: the cell is empty"),
+        ("g.xyz", "1 2 3 4 5\n", "", "it has: 1, 2, 3, 4, 5"),
+        ("h.las", "LASF", "", "the file: "),
+        ("i.pcd", "VERSION 0.7\n", "", "there is no line DATA"),
+        ("j.xyz", "1 2 3 0\n", " --power counts", "point 0 has 0 counts"),
+        ("k.abc", "", "", ".ply, .csv, .xyz"),
+    ] {
+        fs::write(at.join(name), text).unwrap();
+        let error = refused(at, &format!("measure {name}{flags} --scene scene.toml -o out"));
+        assert!(error.contains(expected), "{name}: {error}");
+        assert!(!at.join("out").exists());
+    }
+    let error = refused(at, "measure a.csv --columns X --scene scene.toml -o out");
+    assert!(error.contains("write THEIRS=OURS"), "{error}");
+}
+
+#[test]
+fn a_foreign_curve_is_fitted_compared_and_stored() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut text = "grazing;NRCS;wind\n".to_owned();
+    for k in 0..40 {
+        let theta_rad = f64::from(k) * 0.03;
+        let level = 0.02 * theta_rad.cos().powi(3);
+        text += &format!("{};{level};7,5\n", 90.0 - theta_rad.to_degrees()).replace('.', ",");
+    }
+    fs::write(at.join("sea.csv"), text).unwrap();
+    let columns = "--columns grazing=grazing_deg,NRCS=sigma0";
+    let fit = said(at, &format!("fit sea.csv {columns} --model lambert --looks 100"));
+    assert!(fit.contains("passed over: wind") && fit.contains("converged"), "{fit}");
+    let near = said(at, &format!("near --curve sea.csv {columns} --measured-at 300"));
+    assert!(near.contains("at 40 angles of the curve"), "{near}");
+    let add = format!(
+        "add --from sea.csv {columns} --name sea --class water --kind synthetic --source drawn --licence CC0-1.0 --frequency 300"
+    );
+    let added = said(at, &add);
+    assert!(added.contains("added sea, revision 1"), "{added}");
+    // A table in the plane of incidence: its backscatter is fitted, all of it is stored.
+    let mut plane = "theta_i_deg,theta_s_deg,brdf_per_sr\n".to_owned();
+    for k in 0..20 {
+        plane += &format!("{0},{1},0.1\n{0},{0},0.2\n", 3 * k + 1, -(3 * k + 1));
+    }
+    fs::write(at.join("plane.csv"), plane).unwrap();
+    let fit = said(at, "fit plane.csv --model lambert --looks 100");
+    assert!(fit.contains("20 of 40 rows are not backscatter and are left out"), "{fit}");
+    let add = "add --from plane.csv --name plane --class paint --kind synthetic --source drawn --licence CC0-1.0 --frequency 300";
+    assert!(said(at, add).contains("added plane"));
+    let shown = said(at, "show plane --json");
+    assert!(shown.contains("theta_r_rad"), "{shown}");
+}
+
+#[test]
+fn new_files_load_and_are_not_written_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let made = said(at, "new material my-wall");
+    assert!(made.contains("matdb add --from my-wall"), "{made}");
+    assert!(said(at, "add --from my-wall").contains("added my-wall, revision 1"));
+    assert!(refused(at, "new material my-wall").contains("exists already"));
+    assert!(refused(at, "new material My.Wall").contains("My.Wall"));
+}
