@@ -27,6 +27,8 @@ pub struct NewScene<'a> {
     pub scene_file: &'a Path,
     /// Where the radar stood; `None` to find it from the ranges.
     pub radar_at: Option<Point<Global>>,
+    /// The middle of the field of view; `None` for the middle of the points.
+    pub look_at: Option<Point<Global>>,
     /// Centre frequency, GHz.
     pub frequency_ghz: f64,
 }
@@ -58,7 +60,8 @@ impl NewScene<'_> {
     pub fn make(&self) -> Result<MadeScene, Error> {
         let (radar_at, how) = self.place()?;
         let points: Vec<DVec3> = self.cloud.points().iter().map(|p| p.point.xyz).collect();
-        let look_at = Point::from(median_point(&points));
+        let middle = Point::from(median_point(&points));
+        let look_at = self.look_at.unwrap_or(middle);
         let stem = self.scene_file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let rays_name = format!("{stem}-rays.csv");
         let text = self.text(&stem, radar_at, &how, look_at, &rays_name);
@@ -66,7 +69,7 @@ impl NewScene<'_> {
         let name = self.scene_file.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let files = vec![(name, text.into_bytes()), (rays_name, rays.into_bytes())];
         let scene = self.load(&files)?;
-        let notices = off_the_mesh(&scene, look_at).into_iter().collect();
+        let notices = off_the_mesh(&scene, middle).into_iter().collect();
         Ok(MadeScene { files, radar_at, how, notices })
     }
 
@@ -132,7 +135,7 @@ impl NewScene<'_> {
         rays: &str,
     ) -> String {
         let range_m = significant(radar_at.distance_m(look_at), 4);
-        let [position, middle] = [radar_at, look_at].map(|point| {
+        let [position, looks_at] = [radar_at, look_at].map(|point| {
             let [x, y, z] = point.xyz.to_array().map(|metres| significant(metres, 7));
             format!("[{x}, {y}, {z}]")
         });
@@ -151,6 +154,11 @@ impl NewScene<'_> {
                 "# threshold_dbm = -77              # of no use with relative powers".to_owned()
             }
         };
+        let middle = if self.look_at.is_some() {
+            "the middle of the field of view, as given"
+        } else {
+            "the middle of the points; the spot is narrowest where the radar looked"
+        };
         format!(
             "# The scene of {cloud}, written by `matdb new scene`. Change what your radar has otherwise; the book's page on\n\
              # the radar table has every key.\n\
@@ -165,7 +173,7 @@ impl NewScene<'_> {
              {threshold}\n\
              # spot_diameter_m = 0.016          # of the beam where it is focused, full width at half maximum\n\
              position_m = {position}  # where the rays start: {how}\n\
-             look_at_m = {middle}   # the middle of the points\n\
+             look_at_m = {looks_at}   # {middle}\n\
              # up = [0, 1, 0]                   # which way is up in the image\n\
              \n\
              [radar.beam]\n\
@@ -223,15 +231,15 @@ impl NewScene<'_> {
     }
 }
 
-/// A sentence on a cloud that is not where the mesh is.
-fn off_the_mesh(scene: &Scene, look_at: Point<Global>) -> Option<String> {
+/// A sentence on a cloud, of this middle, that is not where the mesh is.
+fn off_the_mesh(scene: &Scene, middle: Point<Global>) -> Option<String> {
     let vertices = &scene.target.mesh.vertices;
     let least = vertices.iter().copied().fold(DVec3::INFINITY, DVec3::min);
     let most = vertices.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
     // To the box around the mesh, which the middle of the points is near where the target stands as it was measured.
-    let beside = look_at.xyz - look_at.xyz.clamp(least, most);
+    let beside = middle.xyz - middle.xyz.clamp(least, most);
     (beside.length() > FAR_M).then(|| {
-        let shift = look_at.xyz - 0.5 * (least + most);
+        let shift = middle.xyz - 0.5 * (least + most);
         let [x, y, z] = shift.to_array().map(|metres| significant(metres, 3));
         format!(
             "the middle of the points is {} m beside the mesh: is its unit metres (scale), and its frame that of the cloud? \

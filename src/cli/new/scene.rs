@@ -35,6 +35,9 @@ pub(super) struct Args {
     /// Where the radar stood, m, in the frame of the cloud [default: found from the ranges]
     #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
     radar_at: Option<Point<Global>>,
+    /// The middle of the radar's field of view, m, where its spot is narrowest [default: the middle of the points]
+    #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
+    look_at: Option<Point<Global>>,
     /// Centre frequency of the radar
     #[arg(long, value_name = "GHZ", default_value_t = 300.0, allow_negative_numbers = true)]
     frequency: f64,
@@ -51,6 +54,7 @@ pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
         mesh: &args.mesh,
         scene_file: &args.output,
         radar_at: args.radar_at,
+        look_at: args.look_at,
         frequency_ghz: args.frequency,
     };
     let made = new.make()?;
