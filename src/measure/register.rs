@@ -328,10 +328,12 @@ impl RegistrationResult {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measure::reduce::Reduction;
     use crate::measure::synthetic::{
-        SyntheticScan, apart, cylinder, mannequin, pushed, stretched, turned,
+        SyntheticScan, apart, cylinder, f_per_sr, mannequin, pushed, stretched, turned,
     };
-    use crate::scene::solids;
+    use crate::scene::{Target, solids};
+    use crate::units::db_from_ratio;
 
     /// The pose is known this well at a range noise of 2 mm.
     const NEAR_M: f64 = 0.5e-3;
@@ -434,6 +436,10 @@ mod tests {
                     let most_m = NEAR_M + NEAR_RAD * mark.distance(marks[0].0);
                     assert!(off_m < most_m, "{name} {seed}: {mark} is {off_m} m off");
                 }
+                if seed < 3 {
+                    let off_db = curve_error_db(&measured, &found);
+                    assert!(off_db.abs() < 0.3, "{name} {seed}: the curve is {off_db} dB off");
+                }
                 // Where a direction is not told, the target keeps what was given in it.
                 if name == "sphere" {
                     let turned = (found.pose * given.inverse()).rotation();
@@ -442,6 +448,24 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Mean of a curve over the truth at its angles, dB.
+    fn curve_error_db(measured: &SyntheticScan, found: &RegistrationResult) -> f64 {
+        let target = Target {
+            mesh: measured.mesh.clone(),
+            meshes: vec![],
+            regions: vec![],
+            region_of_facet: vec![0; measured.mesh.facets.len()],
+        };
+        let SyntheticScan { radar, chirps, cloud, .. } = measured;
+        let reduced = Reduction::default().run(&target, radar, chirps, cloud, found).unwrap();
+        let errors_db = reduced.curve.detected().map(|row| {
+            let f_per_sr = f_per_sr(row.theta_i_rad);
+            let truth = 4.0 * std::f64::consts::PI * f_per_sr * row.theta_i_rad.cos().powi(2);
+            db_from_ratio(row.sigma0.unwrap() / truth)
+        });
+        errors_db.sum::<f64>() / reduced.curve.detected().count() as f64
     }
 
     #[test]
