@@ -93,6 +93,8 @@ fn three_steps_lead_from_a_foreign_cloud_to_a_curve() {
     let at = folder.path();
     let points = detections(at);
     fs::write(at.join("scan.xyz"), xyz(&points)).unwrap();
+    let own = said(at, "measure out/cloud.ply --scene theirs.toml --exact-mesh -o own");
+    assert!(own.contains("curve:") && !own.contains("passed over"), "{own}");
     let mesh = "--mesh builtin:sphere";
     let columns = "--columns Intensity=power_dbm";
     let unknown = refused(at, &format!("new scene --cloud scan.xyz {columns} {mesh}"));

@@ -16,6 +16,7 @@ use super::cloud::{Cloud, CloudError, CloudPoint, POSSIBLE_DBM};
 use crate::formats::{ColumnNames, PointFormat, PointTable};
 use crate::frames::{Global, Point, Pose, Target};
 use crate::material::Scale;
+use crate::render::BESIDE_THE_MEASURED;
 use crate::units::watts_from_dbm;
 
 /// The unit of a power without a unit in its name.
@@ -140,7 +141,7 @@ impl CloudReading {
         }
         cloud.scale = unit.scale();
         cloud.notices.extend(table.notices.iter().cloned());
-        cloud.notices.extend(table.passed_over(&KNOWN));
+        cloud.notices.extend(table.passed_over(&[&KNOWN[..], &BESIDE_THE_MEASURED].concat()));
         Ok(cloud)
     }
 
@@ -265,7 +266,7 @@ mod tests {
             power_w: watts_from_dbm(-60.0),
         };
         assert_eq!(cloud.points(), [expected]);
-        assert_eq!(cloud.notices, ["these columns are passed over: facet"]);
+        assert!(cloud.notices.is_empty());
     }
 
     #[test]

@@ -4,6 +4,26 @@ use super::echo::{Echo, Truth};
 use crate::formats::ply::{Column, Scalar, Table};
 use crate::units::{db_from_ratio, dbm_from_watts};
 
+/// Columns of [`cloud_table`] that no measurement has, or that follow from its others.
+pub const BESIDE_THE_MEASURED: [&str; 16] = [
+    "xt_m",
+    "yt_m",
+    "incidence_deg",
+    "incidence_sd_deg",
+    "azimuth_deg",
+    "edge_m",
+    "specular_share",
+    "surfaces",
+    "facet",
+    "region",
+    "material",
+    "phase_rad",
+    "rank",
+    "sheets",
+    "passed_db",
+    "true_range_m",
+];
+
 /// The table of a point cloud: position in the global frame (double), then the measured values and the true cause of
 /// each point. The cause of a false alarm is NaN, or −1 for whole numbers.
 ///
