@@ -13,6 +13,10 @@ CREATE TABLE curve_levels (
     FOREIGN KEY (revision_id, curve) REFERENCES curve (revision_id, name) ON DELETE CASCADE
 ) STRICT, WITHOUT ROWID;
 
+INSERT INTO unit (column_name, ucum, meaning) VALUES
+    ('only_detected', '1', '1 where only detections were recorded, so that silent chirps are not known'),
+    ('relative', '1', '1 where levels are known up to a common factor only');
+
 DROP VIEW IF EXISTS v_curves;
 CREATE VIEW v_curves AS
 SELECT slug, number AS revision, curve.name AS curve, source.kind AS kind,

@@ -102,7 +102,8 @@ fn three_steps_lead_from_a_foreign_cloud_to_a_curve() {
         unknown.contains("0 of the points have a range") && unknown.contains("--radar-at"),
         "{unknown}"
     );
-    let new = format!("new scene --cloud scan.xyz {columns} {mesh} --radar-at 0.4,1.3,3");
+    let new =
+        format!("new scene --cloud scan.xyz {columns} {mesh} --radar-at 0.4,1.3,3 --look-at 0,1,0");
     let made = said(at, &new);
     assert!(made.contains("0.400, 1.300, 3.000 m (as given)"), "{made}");
     assert!(made.contains("beside the mesh"), "the ball of a metre stands at the origin: {made}");

@@ -76,8 +76,11 @@ fn a_curve_keeps_its_footprint_and_its_beam_wherever_it_goes() {
     let table = fs::read_to_string(at.join("site/tables/curve_illumination.csv")).unwrap();
     assert!(table.contains("projected,0.0117"), "{table}");
     let points = fs::read_to_string(at.join("site/material/lit.csv")).unwrap();
-    assert!(points.lines().next().unwrap().ends_with(",footprint,beam_rad"), "{points}");
-    assert!(points.lines().nth(1).unwrap().ends_with(",projected,0.011700"), "{points}");
+    assert!(
+        points.lines().next().unwrap().ends_with(",footprint,beam_rad,relative,only_detected"),
+        "{points}"
+    );
+    assert!(points.lines().nth(1).unwrap().ends_with(",projected,0.011700,,"), "{points}");
     let page = fs::read_to_string(at.join("site/material/lit.html")).unwrap();
     assert!(page.contains("footprint projected (cos of the incidence once); beam of 11.7 mrad"));
     run(at, "import site --db other.sqlite -q");
@@ -205,7 +208,10 @@ fn measure_states_how_its_curve_was_lit() {
     let (text, _) = run(at, &line.split_whitespace().collect::<Vec<_>>().join(" "));
     assert!(text.contains("footprint projected"), "{text}");
     let csv = fs::read_to_string(at.join("measured/curve.csv")).unwrap();
-    assert!(csv.lines().next().unwrap().ends_with(",footprint,beam_rad"), "{csv}");
+    assert!(
+        csv.lines().next().unwrap().ends_with(",footprint,beam_rad,relative,only_detected"),
+        "{csv}"
+    );
     let pose: Value =
         serde_json::from_slice(&fs::read(at.join("measured/pose.json")).unwrap()).unwrap();
     let stored = &json(at, "show spectralon")["material"]["curves"];

@@ -210,7 +210,11 @@ fn clouds_that_cannot_be_used() {
         "chirp,x_m,y_m,z_m,power_dbm\n3,0,1,0,-60\n3,0,1.1,0,-61\n",
         &["chirp 3", "one detection per chirp"],
     );
-    refuse("cloud.tif", "", &[".ply, .csv or .xyz"]);
+    refuse(
+        "cloud.tif",
+        "",
+        &["has the ending of no format of clouds; convert or rename it: .ply, .csv, .xyz"],
+    );
     refuse("millimetres.xyz", "0 1100 100 -60\n100 1200 90 -61\n", &["millimetres"]);
     fs::write(at.join("good.csv"), csv(at, 1, as_is)).unwrap();
     for (more, parts) in [

@@ -177,7 +177,7 @@ impl NewScene<'_> {
              # up = [0, 1, 0]                   # which way is up in the image\n\
              \n\
              [radar.beam]\n\
-             focus_m = {range_m}\n\
+             focus_m = {range_m}                    # where the spot is smallest: levels depend on it\n\
              \n\
              [radar.scan]\n\
              pattern = \"rays\"\n\

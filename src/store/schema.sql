@@ -587,6 +587,8 @@ INSERT INTO unit VALUES ('number', '1', 'number of a revision of its material, f
 
 INSERT INTO unit VALUES ('observations', '1', 'number of points on all curves together');
 
+INSERT INTO unit VALUES ('only_detected', '1', '1 where only detections were recorded, so that silent chirps are not known');
+
 INSERT INTO unit VALUES ('p', '1', 'probability of so much by chance, for one test alone');
 
 INSERT INTO unit VALUES ('placebo_gain', '1', 'largest gain in ln likelihood of something meaningless');
@@ -612,6 +614,8 @@ INSERT INTO unit VALUES ('real', '1', 'eps'' of the relative permittivity eps'' 
 INSERT INTO unit VALUES ('real_sd', '1', 'standard deviation of the real part');
 
 INSERT INTO unit VALUES ('registration_rms_m', 'm', 'root mean square of what the registration left over');
+
+INSERT INTO unit VALUES ('relative', '1', '1 where levels are known up to a common factor only');
 
 INSERT INTO unit VALUES ('relative_humidity', '1', 'relative humidity of the air, 0 to 1');
 
