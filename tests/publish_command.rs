@@ -612,7 +612,7 @@ fn a_publication_of_an_older_schema_is_verified_and_imported() {
              DROP TABLE curve_levels; DROP TABLE curve_illumination; DROP TABLE fit_lobes;
              ALTER TABLE outline DROP COLUMN footprint; ALTER TABLE outline DROP COLUMN lobes;
              ALTER TABLE observation DROP COLUMN yt_m; ALTER TABLE observation DROP COLUMN xt_m;
-             DELETE FROM unit WHERE column_name LIKE 'held_out%' OR column_name IN ('xt_m', 'yt_m', 'beam_rad');
+             DELETE FROM unit WHERE column_name LIKE 'held_out%' OR column_name IN ('xt_m', 'yt_m', 'beam_rad', 'relative', 'only_detected');
              {curves} {fits} PRAGMA user_version = 8;"
         ),
     );
