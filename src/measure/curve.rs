@@ -103,7 +103,9 @@ impl Curve {
     /// # Errors
     /// The first cell that cannot be used, with its line and column, and rows that are not backscatter.
     pub fn read_as(bytes: &[u8], names: &ColumnNames) -> Result<(Curve, Vec<String>), FormatError> {
-        let Points { mut rows, illumination, mut notices, in_plane } = points(bytes, names)?;
+        let Points { mut rows, illumination, in_plane, passed_over, notices } =
+            points(bytes, names)?;
+        let mut notices: Vec<String> = passed_over.into_iter().chain(notices).collect();
         if in_plane {
             let all = rows.len();
             rows.retain(|(_, point)| point.is_retro());

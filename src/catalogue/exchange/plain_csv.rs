@@ -76,7 +76,8 @@ pub(super) fn read(
 ) -> Result<(Material, Vec<String>), ExchangeError> {
     let points =
         file::points(bytes, &given.columns).map_err(|error| ExchangeError::in_file(file, error))?;
-    let (illumination, notices) = (points.illumination, points.notices);
+    let illumination = points.illumination;
+    let notices = points.passed_over.into_iter().chain(points.notices).collect();
     let observations: Vec<Observation> = points.rows.into_iter().map(|(_, point)| point).collect();
     if observations.is_empty() {
         let empty =

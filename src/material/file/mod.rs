@@ -200,6 +200,10 @@ fn read_curve(
     let csv = Path::new(file).with_file_name(&entry.file);
     let points = points(&bytes, &ColumnNames::default())
         .map_err(|error| FileError::Format { file: csv.display().to_string(), error })?;
+    if let Some(passed_over) = points.passed_over {
+        let error = FormatError::at("the header", passed_over, "a [[curve]] has our columns only");
+        return Err(FileError::Format { file: csv.display().to_string(), error });
+    }
     let CurveFile { name, source, instrument, session, footprint, beam_rad, .. } = entry;
     let stated = Illumination { footprint, beam_rad, ..Illumination::default() };
     let Some(illumination) = points.illumination.and(stated) else {

@@ -69,7 +69,9 @@ pub struct Points {
     pub illumination: Illumination,
     /// Whether the table is one in the plane of incidence, of which few rows are backscatter.
     pub in_plane: bool,
-    /// What a person should know of the file.
+    /// A sentence on columns of which nothing is read.
+    pub passed_over: Option<String>,
+    /// What else a person should know of the file.
     pub notices: Vec<String>,
 }
 
@@ -87,7 +89,8 @@ pub fn points(bytes: &[u8], names: &ColumnNames) -> Result<Points, FormatError> 
     table.lower_case();
     let form = Form::of(&table)?;
     let known: Vec<&str> = [&ANGLES[..], &LEVELS, &IN_PLANE, &OPTIONAL].concat();
-    let mut notices: Vec<String> = table.passed_over(&known).into_iter().collect();
+    let passed_over = table.passed_over(&known);
+    let mut notices = Vec::new();
     one_of(&table, "curve", "another curve begins here")?;
     one_of(&table, "footprint", "the rows above have another footprint")?;
     one_of(&table, "beam_rad", "the rows above have another beam")?;
@@ -111,7 +114,7 @@ pub fn points(bytes: &[u8], names: &ColumnNames) -> Result<Points, FormatError> 
             .push(format!("{below} of {all} levels are not above their blank and count as limits"));
     }
     let in_plane = matches!(form, Form::InPlane);
-    Ok(Points { rows, illumination: illumination(&table)?, in_plane, notices })
+    Ok(Points { rows, illumination: illumination(&table)?, in_plane, passed_over, notices })
 }
 
 /// What the rows of a table hold.
@@ -484,7 +487,7 @@ mod tests {
         }
         let names: ColumnNames = "inc=theta_deg,NRCS=sigma0".parse().unwrap();
         let theirs = points(b"inc,NRCS,comment\n30,0.1,7\n", &names).unwrap();
-        assert_eq!(theirs.notices, ["these columns are passed over: comment"]);
+        assert_eq!(theirs.passed_over.unwrap(), "these columns are passed over: comment");
         assert!((theirs.rows[0].1.sigma0.unwrap() - 0.1).abs() < 1e-15);
     }
 
