@@ -1,12 +1,16 @@
-"""Checks the evaluation on sheets whose constants are known: how often the intervals hold, and what is refused.
+"""Checks the evaluation on sheets whose constants are known: how often the intervals hold. And whether the built-in material
+is what its traces say.
 
     python check.py [--sheets 40]
 """
 
 import argparse
+import os
+import tomllib
 
 import numpy as np
 
+import evaluate
 import sheet
 
 C = sheet.C
@@ -49,11 +53,25 @@ def runs(rng, n_of, thickness, count=2, noise=0.003):
     return made
 
 
+def check_built_in(folder):
+    """The constants of the built-in material are those of the traces beside it."""
+    traces, thicknesses = evaluate.read(os.path.join(folder, "PVDF_520um.thz"))
+    found = sheet.evaluate(traces, float(np.mean(thicknesses)))
+    with open(os.path.join(folder, "material.toml"), "rb") as file:
+        stated = [row for row in tomllib.load(file)["permittivity"] if row["key"] == "pvdf"]
+    for row in stated:
+        at = found.at(1e9 * row["frequency_ghz"])
+        for name, key in (("real", "real"), ("imaginary", "imag"), ("real_sd", "real_sd"), ("imaginary_sd", "imag_sd")):
+            assert abs(row[name] - at[key]) < 1e-4, f"pvdf at {row['frequency_ghz']} GHz: {name} is {at[key]:.4f}, not {row[name]}"
+    print(f"pvdf: {len(stated)} frequencies are as its traces say")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sheets", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
+    check_built_in(os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../materials/pvdf"))
     held = {"n": [0, 0], "k": [0, 0]}
     exact = 0.0
     for number in range(arguments.sheets):

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use super::console::Console;
+use crate::catalogue::{Spectrum, spectra};
 use crate::error::Error;
 use crate::files::{folder_of, write_all};
 use crate::formats::figure::Plot;
@@ -18,6 +19,7 @@ use crate::setup::{Database, MaterialRevision, find_material};
 #[command(after_help = "Examples:
   matdb plot mannequin-paint -o paint.svg
   matdb plot mannequin-paint --sweep specular.m=0.01,0.05,0.1 -o sweep.png
+  matdb plot pvdf --permittivity -o pvdf.svg    the permittivity over frequency
   matdb plot --appendix -o figures          figures 16 to 19 of the paper, as PNG and SVG")]
 #[command(group = clap::ArgGroup::new("what").required(true))]
 pub(super) struct Args {
@@ -30,6 +32,9 @@ pub(super) struct Args {
     /// Draw the fit for several values of one parameter
     #[arg(long, value_name = "PARAMETER=V1,V2,…", requires = "material")]
     sweep: Option<String>,
+    /// Draw the permittivity over frequency, with 95 % bands, instead of the scattering
+    #[arg(long, requires = "material", conflicts_with = "sweep")]
+    permittivity: bool,
     /// A .svg or .png file; a folder with --appendix
     #[arg(long, short, value_name = "FILE")]
     output: PathBuf,
@@ -41,6 +46,18 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
             let files = appendix_figures()?;
             write_all(&args.output, &files)?;
             files.iter().map(|(name, _)| args.output.join(name).display().to_string()).collect()
+        }
+        Some(name) if args.permittivity => {
+            let store = db.read()?;
+            let MaterialRevision { material, .. } = find_material(store.as_ref(), name, "")?;
+            let spectra = spectra(&material);
+            if spectra.is_empty() {
+                let what = format!("`{name}` has no permittivity at three or more frequencies");
+                let way_out =
+                    "`matdb show` prints those that it has; state more as [[permittivity]]";
+                return Err(Error::usage(what, way_out));
+            }
+            write_plot(&args.output, &Spectrum::plot(&material.name, "", &spectra))?
         }
         Some(name) => {
             let store = db.read()?;

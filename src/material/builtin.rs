@@ -28,7 +28,7 @@ macro_rules! entries {
     };
 }
 
-static ENTRIES: [Entry; 38] = entries![
+static ENTRIES: [Entry; 39] = entries![
     "acrylate-resist",
     "alumina",
     "alumina-film",
@@ -60,6 +60,7 @@ static ENTRIES: [Entry; 38] = entries![
     "polypropylene",
     "polystyrene",
     "ptfe",
+    "pvdf",
     "pyrex",
     "spectralon",
     "steel",

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::entry::place_of;
 use super::quantity::quantity;
+use super::spectra::{self, SpectrumView};
 use crate::effects::find;
 use crate::formats::words::{digits, plus_minus};
 use crate::material::{Finding, FindingVerdict, Layer, Material, Permittivity, Session, Status};
@@ -17,6 +18,7 @@ pub(super) struct Composition {
     roughness: Option<(String, usize)>,
     layers: Vec<LayerView>,
     permittivities: Vec<PermittivityView>,
+    spectra: Vec<SpectrumView>,
     sessions: Vec<SessionView>,
     findings: Vec<FindingView>,
 }
@@ -69,6 +71,7 @@ pub(super) fn view(material: &Material) -> Composition {
         roughness: roughness(material),
         layers: material.layers.iter().map(|l| layer(material, l)).collect(),
         permittivities: material.permittivities.iter().map(|p| permittivity(material, p)).collect(),
+        spectra: spectra::view(material),
         sessions: material.sessions.iter().map(session).collect(),
         findings: material.findings.iter().map(|f| finding(material, f)).collect(),
     }

@@ -18,6 +18,7 @@ mod picture;
 mod quantity;
 mod residuals;
 mod script;
+mod spectra;
 mod table;
 mod words;
 
