@@ -19,7 +19,7 @@ use support::database::{
     attributed, change, complete, contents, fitted, lit, placed, relative, sample, with_effects,
 };
 
-const NEWEST: &str = "schema-0013.sqlite";
+const NEWEST: &str = "schema-0014.sqlite";
 
 fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures")

@@ -35,8 +35,8 @@ pub struct FitResult {
     pub gauge_k: Option<f64>,
     /// The fitted numbers.
     pub estimates: Vec<Estimate>,
-    /// Covariance of the fitted numbers, in the order of `estimates`; rows and columns of those without
-    /// a standard deviation are 0 and say nothing.
+    /// Covariance of the fitted numbers, in the order of `estimates`, without the directions that the data do not
+    /// determine; rows and columns of those at a bound are 0.
     pub covariance: Vec<Vec<f64>>,
     /// Singular values of the information, scaled to a unit diagonal, largest first; a millionth
     /// of the first is an unseen direction.

@@ -122,15 +122,13 @@ fn count(number: usize) -> u32 {
 }
 
 /// The 95 % band of a stored fit at an angle (rad), as the beam of its curve sees it, by the delta method on ln σ⁰;
-/// `None` for a fit without a report. The derivatives are difference quotients of the stored model.
+/// `None` for a fit without a report and for one that did not converge. It is the band of a law of this form: how far the
+/// form itself is off is no part of it. The derivatives are difference quotients of the stored model.
 pub fn stored_band(fit: &material::Fit, theta_rad: f64) -> Option<Band> {
-    let report = fit.report.as_ref()?;
+    let report = fit.report.as_ref().filter(|report| report.converged)?;
     let beam_rad = fit.beam_rad().unwrap_or(0.0);
-    let slopes: Vec<f64> = report
-        .estimates
-        .iter()
-        .map(|e| if e.sd.is_some() { slope(&fit.model, e, beam_rad, theta_rad) } else { 0.0 })
-        .collect();
+    let slopes: Vec<f64> =
+        report.estimates.iter().map(|e| slope(&fit.model, e, beam_rad, theta_rad)).collect();
     let terms = report.covariance.iter().zip(&slopes).flat_map(|(row, a)| {
         row.iter().zip(&slopes).map(move |(covariance, b)| a * b * covariance)
     });

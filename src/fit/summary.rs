@@ -74,12 +74,13 @@ fn estimate(found: &SearchResult, index: usize, coordinate: &Coordinate, u: f64)
     }
 }
 
-/// Covariance of the numbers; rows and columns of those that the data do not identify are 0.
+/// Covariance of the numbers. Directions that the data do not determine and numbers at a bound add nothing. A number
+/// without a deviation keeps its row: what is hard to tell apart varies together, and a band needs both.
 fn covariance(coordinates: &Coordinates, found: &SearchResult) -> Vec<Vec<f64>> {
     let at = &found.best.at;
     let mut scales = vec![0.0; at.len()];
     for (index, coordinate) in coordinates.list.iter().enumerate() {
-        if found.uncertainty.is_identified(index) {
+        if !found.uncertainty.bounded[index] {
             scales[index] = coordinate.slope(at[index]);
         }
     }

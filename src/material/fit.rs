@@ -159,9 +159,9 @@ impl Fit {
 }
 
 impl FitNumber {
-    /// Whether the data determine the number by itself.
+    /// Whether the data determine the number by itself: its interval is known and the search did not stop at an end.
     pub fn is_identified(&self) -> bool {
-        self.sd.is_some() && !self.is_at_bound
+        self.sd.is_some() && self.interval_95.is_some() && !self.is_at_bound
     }
 
     /// A parameter of the model, by the report of the fit.

@@ -22,7 +22,8 @@ pub struct FitReport {
     pub gauge: Option<String>,
     /// The numbers found.
     pub estimates: Vec<Estimate>,
-    /// Their covariance, row by row; rows of estimates without a deviation are 0 and say nothing.
+    /// Their covariance, row by row, without the directions that the data do not determine; rows of estimates at a bound
+    /// are 0. Before 0.2.0 so were those of all estimates without a deviation.
     pub covariance: Vec<Vec<f64>>,
     /// Singular values of the information, scaled to a unit diagonal, largest first.
     pub singular_values: Vec<f64>,
@@ -119,6 +120,18 @@ pub struct Goodness {
     pub rows: u32,
 }
 
+impl Goodness {
+    /// How far the form of the law is off, dB rms: what speckle does not explain of the scatter about it. 0 where that is
+    /// no more than chance leaves in so many independent rows, two standard deviations of their variance; none where the
+    /// speckle is not known.
+    pub fn form_error_db(&self) -> Option<f64> {
+        let noise_db2 = self.speckle_db?.powi(2);
+        let beyond_db2 = self.rms_db.powi(2) - noise_db2;
+        let chance_db2 = 2.0 * noise_db2 * (2.0 / f64::from(self.rows.max(1))).sqrt();
+        Some(if beyond_db2 > chance_db2 { beyond_db2.sqrt() } else { 0.0 })
+    }
+}
+
 impl CrossValidation {
     /// What the blocks are, in words.
     pub fn of(&self) -> String {
@@ -212,6 +225,25 @@ impl FitReport {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_error_of_a_form_is_what_speckle_leaves_unexplained() {
+        let goodness = |rms_db, rows| Goodness {
+            rms_db,
+            mean_db: 0.0,
+            speckle_db: Some(3.0),
+            z_mean: 0.0,
+            z_variance: 1.0,
+            ks_distance: 0.0,
+            rows,
+        };
+        assert_eq!(goodness(5.0, 200).form_error_db(), Some(4.0));
+        // 200 rows: the variance scatters by a tenth.
+        assert_eq!(goodness(3.2, 200).form_error_db(), Some(0.0));
+        assert!(goodness(3.2, 20_000).form_error_db().is_some_and(|db| (db - 1.1136).abs() < 1e-3));
+        assert_eq!(goodness(2.0, 200).form_error_db(), Some(0.0));
+        assert_eq!(Goodness { speckle_db: None, ..goodness(5.0, 200) }.form_error_db(), None);
+    }
 
     fn report() -> FitReport {
         let estimate = Estimate {

@@ -21,7 +21,7 @@ use crate::files::folder_of;
 const APPLICATION_ID: i64 = 0x6d61_7464;
 
 /// The latest schema.
-const LATEST: usize = 13;
+const LATEST: usize = 14;
 
 /// Every migration, oldest first. Append only: users have files of every schema.
 /// `fill` computes what older programs did not store. It runs at the latest schema, the only one that this program
@@ -40,8 +40,9 @@ fn schemas(fill: Backlog) -> [M<'static>; LATEST] {
         M::up(include_str!("../../migrations/0010_four_letters.sql")),
         M::up(include_str!("../../migrations/0011_one_value.sql")),
         M::up(include_str!("../../migrations/0012_beam_of_a_curve.sql")),
+        M::up(include_str!("../../migrations/0013_levels_of_a_curve.sql")),
         M::up_with_hook(
-            include_str!("../../migrations/0013_levels_of_a_curve.sql"),
+            include_str!("../../migrations/0014_identified.sql"),
             move |tx: &Transaction| Ok(fill.run(tx)?),
         ),
     ]

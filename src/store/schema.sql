@@ -414,19 +414,6 @@ CREATE TABLE fit_number (
     FOREIGN KEY (revision_id, fit) REFERENCES fit (revision_id, name) ON DELETE CASCADE
 ) STRICT, WITHOUT ROWID;
 
-CREATE VIEW fit_estimate AS
-SELECT n.revision_id AS revision_id, n.fit AS fit, n.position AS position, n.name AS name,
-    CAST(coalesce(p.value, json_extract(report, estimate || '.value')) AS REAL) AS value,
-    coalesce(p.unit, '1') AS unit,
-    CAST(json_extract(report, estimate || '.sd') AS REAL) AS sd,
-    CAST(json_extract(report, estimate || '.interval_95[0]') AS REAL) AS low_95,
-    CAST(json_extract(report, estimate || '.interval_95[1]') AS REAL) AS high_95,
-    chosen_by, at_bound,
-    CAST(at_bound = 0 AND json_extract(report, estimate || '.sd') IS NOT NULL AS INTEGER) AS identified
-FROM fit_number AS n
-JOIN fit ON fit.revision_id = n.revision_id AND fit.name = n.fit
-LEFT JOIN fit_parameter AS p ON p.revision_id = n.revision_id AND p.fit = n.fit AND p.path = n.name;
-
 CREATE TABLE curve_illumination (
     revision_id INTEGER NOT NULL,
     curve       TEXT    NOT NULL,
@@ -444,6 +431,44 @@ CREATE TABLE fit_lobes (
     PRIMARY KEY (revision_id, fit),
     FOREIGN KEY (revision_id, fit) REFERENCES fit (revision_id, name) ON DELETE CASCADE
 ) STRICT, WITHOUT ROWID;
+
+CREATE TABLE curve_levels (
+    revision_id   INTEGER NOT NULL,
+    curve         TEXT    NOT NULL,
+    relative      INTEGER NOT NULL CHECK (relative IN (0, 1)),
+    only_detected INTEGER NOT NULL CHECK (only_detected IN (0, 1)),
+    PRIMARY KEY (revision_id, curve),
+    CHECK (relative = 1 OR only_detected = 1),
+    FOREIGN KEY (revision_id, curve) REFERENCES curve (revision_id, name) ON DELETE CASCADE
+) STRICT, WITHOUT ROWID;
+
+CREATE VIEW v_curves AS
+SELECT slug, number AS revision, curve.name AS curve, source.kind AS kind,
+    theta_i_rad * 57.29577951308232 AS theta_i_deg, theta_r_rad * 57.29577951308232 AS theta_r_deg,
+    delta_phi_rad * 57.29577951308232 AS delta_phi_deg, theta_sd_rad * 57.29577951308232 AS theta_sd_deg,
+    10 * log10(sigma0) AS sigma0_db, censor, 10 * log10(threshold_sigma0) AS threshold_db, xt_m, yt_m,
+    footprint, beam_rad, coalesce(relative, 0) AS relative, coalesce(only_detected, 0) AS only_detected
+FROM material JOIN revision ON material_id = material.id AND number = current_revision
+JOIN curve ON curve.revision_id = revision.id
+JOIN source ON source.revision_id = revision.id AND source.key = curve.source
+JOIN observation
+    ON observation.revision_id = revision.id AND observation.curve = curve.name
+LEFT JOIN curve_illumination AS i ON i.revision_id = revision.id AND i.curve = curve.name
+LEFT JOIN curve_levels AS l ON l.revision_id = revision.id AND l.curve = curve.name;
+
+CREATE VIEW fit_estimate AS
+SELECT n.revision_id AS revision_id, n.fit AS fit, n.position AS position, n.name AS name,
+    CAST(coalesce(p.value, json_extract(report, estimate || '.value')) AS REAL) AS value,
+    coalesce(p.unit, '1') AS unit,
+    CAST(json_extract(report, estimate || '.sd') AS REAL) AS sd,
+    CAST(json_extract(report, estimate || '.interval_95[0]') AS REAL) AS low_95,
+    CAST(json_extract(report, estimate || '.interval_95[1]') AS REAL) AS high_95,
+    chosen_by, at_bound,
+    CAST(at_bound = 0 AND json_extract(report, estimate || '.sd') IS NOT NULL
+        AND json_extract(report, estimate || '.interval_95') IS NOT NULL AS INTEGER) AS identified
+FROM fit_number AS n
+JOIN fit ON fit.revision_id = n.revision_id AND fit.name = n.fit
+LEFT JOIN fit_parameter AS p ON p.revision_id = n.revision_id AND p.fit = n.fit AND p.path = n.name;
 
 CREATE VIEW v_fits AS
 SELECT slug, number AS revision, fit.name AS fit, estimator, fit.curve AS curve,
@@ -474,30 +499,6 @@ LEFT JOIN fit_lobes AS l ON l.revision_id = revision.id AND l.fit = fit.name
 JOIN source ON source.revision_id = revision.id AND source.key = fit.source
 WHERE NOT EXISTS (SELECT 1 FROM fit_parameter AS p
     WHERE p.revision_id = e.revision_id AND p.fit = e.fit AND p.path = e.name);
-
-CREATE TABLE curve_levels (
-    revision_id   INTEGER NOT NULL,
-    curve         TEXT    NOT NULL,
-    relative      INTEGER NOT NULL CHECK (relative IN (0, 1)),
-    only_detected INTEGER NOT NULL CHECK (only_detected IN (0, 1)),
-    PRIMARY KEY (revision_id, curve),
-    CHECK (relative = 1 OR only_detected = 1),
-    FOREIGN KEY (revision_id, curve) REFERENCES curve (revision_id, name) ON DELETE CASCADE
-) STRICT, WITHOUT ROWID;
-
-CREATE VIEW v_curves AS
-SELECT slug, number AS revision, curve.name AS curve, source.kind AS kind,
-    theta_i_rad * 57.29577951308232 AS theta_i_deg, theta_r_rad * 57.29577951308232 AS theta_r_deg,
-    delta_phi_rad * 57.29577951308232 AS delta_phi_deg, theta_sd_rad * 57.29577951308232 AS theta_sd_deg,
-    10 * log10(sigma0) AS sigma0_db, censor, 10 * log10(threshold_sigma0) AS threshold_db, xt_m, yt_m,
-    footprint, beam_rad, coalesce(relative, 0) AS relative, coalesce(only_detected, 0) AS only_detected
-FROM material JOIN revision ON material_id = material.id AND number = current_revision
-JOIN curve ON curve.revision_id = revision.id
-JOIN source ON source.revision_id = revision.id AND source.key = curve.source
-JOIN observation
-    ON observation.revision_id = revision.id AND observation.curve = curve.name
-LEFT JOIN curve_illumination AS i ON i.revision_id = revision.id AND i.curve = curve.name
-LEFT JOIN curve_levels AS l ON l.revision_id = revision.id AND l.curve = curve.name;
 
 INSERT INTO unit VALUES ('aperture_m', 'm', 'diameter of the antenna');
 

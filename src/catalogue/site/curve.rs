@@ -21,15 +21,15 @@ const INKS: usize = 6;
 /// A line of the legend.
 #[derive(Debug, Serialize)]
 pub(super) struct Sample {
-    name: String,
-    kind: &'static str,
+    pub(super) name: String,
+    pub(super) kind: &'static str,
     /// The words of the badge, where they differ from the kind.
-    kind_words: Option<String>,
+    pub(super) kind_words: Option<String>,
     /// `line`, `dots`, `below` or `above`.
-    shape: &'static str,
-    class: String,
+    pub(super) shape: &'static str,
+    pub(super) class: String,
     /// The note after the name.
-    note: &'static str,
+    pub(super) note: &'static str,
 }
 
 /// A curve in words.
@@ -81,7 +81,10 @@ pub(super) fn picture(material: &Material) -> (Option<String>, Vec<Sample>) {
             kind_words: material.kind_words(fit),
             shape: "line",
             class,
-            note: if fit.report.is_some() { "with its 95 % band" } else { "" },
+            note: match &fit.report {
+                Some(report) if report.converged => "with the 95 % band of its numbers",
+                _ => "",
+            },
         });
     }
     if let Some(number) = material.curves.iter().position(|curve| curve.name == material.render)

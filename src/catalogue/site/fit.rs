@@ -8,7 +8,9 @@ use super::residuals;
 use super::words::grouped;
 use crate::brdf::Parameter;
 use crate::formats::words::digits;
-use crate::material::{ChosenBy, CrossValidation, Fit, FitNumber, FitReport, Material, SourceKind};
+use crate::material::{
+    ChosenBy, CrossValidation, Fit, FitNumber, FitReport, Goodness, Material, SourceKind,
+};
 use crate::units::dbm_from_watts;
 
 /// Parameters that backscatter sees only inside a product, and the product's name.
@@ -174,8 +176,11 @@ fn in_words(
     let convention = |name: &str| format!("only inside {name}; this value is a convention");
     match (told, product) {
         (Some(told), _) if told.is_identified() => ("yes".to_owned(), true),
-        (Some(FitNumber { chosen_by: ChosenBy::Data, sd: Some(_), .. }), _) => {
+        (Some(FitNumber { chosen_by: ChosenBy::Data, is_at_bound: true, sd: Some(_), .. }), _) => {
             ("told, but it ended at the end of its range".to_owned(), false)
+        }
+        (Some(FitNumber { chosen_by: ChosenBy::Data, sd: Some(_), .. }), _) => {
+            ("no: others can make up for a change of it".to_owned(), false)
         }
         (Some(FitNumber { chosen_by: ChosenBy::Data, .. }), _) => {
             ("no: the data leave it open".to_owned(), false)
@@ -216,6 +221,15 @@ fn held_out(held: &CrossValidation) -> String {
     format!("{rms_db:.2} dB rms in {folds} turns of {} {of}{score}", grouped(*blocks as usize))
 }
 
+/// How far the form of the law is off, which no band holds.
+fn form_error(goodness: &Goodness) -> String {
+    match goodness.form_error_db() {
+        Some(0.0) => "no more than the noise hides".to_owned(),
+        Some(db) => format!("{db:.2} dB rms beyond the noise; the band does not hold it"),
+        None => "not known: no noise is stated".to_owned(),
+    }
+}
+
 fn report(report: &FitReport) -> ReportView {
     let g = &report.goodness;
     let end = if report.converged { "converged" } else { "did not converge" };
@@ -237,6 +251,7 @@ fn report(report: &FitReport) -> ReportView {
         ("Noise floor", noise),
         ("Set, not found", if given.is_empty() { "nothing".to_owned() } else { given.join(", ") }),
         ("Detections off the model", format!("{:.2} dB rms{speckle}", g.rms_db)),
+        ("The form of the law is off", form_error(g)),
         (
             "Residuals against their law",
             format!(

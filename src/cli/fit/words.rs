@@ -105,9 +105,12 @@ fn goodness(goodness: &Goodness) -> String {
     let speckle = goodness
         .speckle_db
         .map_or(String::new(), |speckle_db| format!(" (speckle alone leaves {speckle_db:.2} dB)"));
+    let form = goodness.form_error_db().filter(|db| *db > 0.0).map_or(String::new(), |db| {
+        format!("the form of the law is off by {db:.2} dB rms, which is not in the deviations\n")
+    });
     format!(
         "detections are {rms_db:.2} dB rms{speckle} and {mean_db:.2} dB on average off the model; \
-         residuals: mean {z_mean:.2}, variance {z_variance:.2}, {ks_distance:.3} off their law\n"
+         residuals: mean {z_mean:.2}, variance {z_variance:.2}, {ks_distance:.3} off their law\n{form}"
     )
 }
 

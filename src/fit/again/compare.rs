@@ -173,12 +173,17 @@ fn covariances(stored: &material::Fit, new: &material::Fit, found: &FitResult) -
         .then(|| "its covariance is not the one that a new fit gives".to_owned())
 }
 
+/// Rows and columns of numbers without a deviation are not compared: they say how these vary with others, on a scale that
+/// the data leave open.
 fn is_same_matrix(old: &[Vec<f64>], new: &[Vec<f64>], sds: &[f64]) -> bool {
     is_square(old, sds.len())
         && is_square(new, sds.len())
         && std::iter::zip(old, new).zip(sds).all(|((old, new), row_sd)| {
             let mut cells = std::iter::zip(old, new).zip(sds);
-            cells.all(|((old, new), sd)| is_near(*old, *new, 2.0 * SAME_SD * row_sd * sd))
+            cells.all(|((old, new), sd)| {
+                let scale = row_sd * sd;
+                scale == 0.0 || is_near(*old, *new, 2.0 * SAME_SD * scale)
+            })
         })
 }
 
