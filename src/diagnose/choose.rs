@@ -198,7 +198,7 @@ fn add_best<'a>(search: &Search, model: &mut Explanation<'a>, trials: &mut [Tria
     let mut tied = Vec::new();
     for other in &contenders {
         let [worse, se] = scorer.difference(&first.held_out, &other.held_out);
-        if worse <= se.max(SAME)
+        if worse <= (scorer.settings.standard_errors * se).max(SAME)
             && (other.trial == first.trial || judge.beats_placebos(&mut trials[other.trial]))
         {
             tied.push(other);

@@ -62,7 +62,7 @@ fn contest<'a>(
     }
     // Of effects that predict equally well the one with fewer parameters in use and nearer laws is better.
     let [better, se] = scorer.difference(&with_rival.held_out, &state.held_out);
-    let is_tied = better.abs() <= se.max(SAME);
+    let is_tied = better.abs() <= (scorer.settings.standard_errors * se).max(SAME);
     let [own, other] = [&*state, &with_rival].map(|state| state.space.against(&state.fit.at));
     let differs = (own - other).abs() >= EVEN;
     let is_better = if is_tied && differs { other < own } else { better > 0.0 };
