@@ -145,7 +145,7 @@ class Missing:
             return thickness, 0.95, level if fit else None
         if self.effect == "angle-offset":
             sign = rng.choice([-1, 1])
-            return sign, min(10, 89 - self.to), lambda x: base.level(np.abs(theta + sign * np.radians(x)))
+            return sign, min(9.5, 89 - self.to), lambda x: base.level(np.abs(theta + sign * np.radians(x)))
         least = 2.8 * np.degrees(theta[1])  # four angles within the lobe
         width = rng.uniform(least, 5) if least < 5 else 5.0
         peak = cosine(theta, 0) * np.exp(-((2 * np.degrees(theta) / width) ** 2) / 2)  # 2θ from the mirror direction
@@ -197,9 +197,20 @@ def sizes(cases):
     return zip(np.exp(x), goal * np.exp(off), np.abs(off) <= TOLERANCE)
 
 
+def left_by_others(cases, levels_db):
+    """What the best refit of any law but the declared one leaves of each curve without its noise, in times the noise."""
+    best = np.full(len(cases), np.inf)
+    for law in LAWS:
+        rows = [i for i, case in enumerate(cases) if case.declared != law]
+        for some in (rows[i: i + 300] for i in range(0, len(rows), 300)):
+            left = Refit(law, [cases[i].theta for i in some]).left([levels_db[i] for i in some], bands=4, short=10, long=25)
+            best[some] = np.minimum(best[some], left / [cases[i].noise for i in some])
+    return best
+
+
 def missing(seed, count):
     """Part B; a case whose effect cannot get that large is drawn again, and marked where this does not help."""
-    done, wanted = {}, range(count)
+    done, drawn, wanted = {}, {}, range(count)
     for attempt in range(TRIES):
         cases = [Missing(seed, k, attempt) for k in wanted]
         for law in LAWS:
@@ -207,8 +218,12 @@ def missing(seed, count):
             for i in range(0, len(same), 300):
                 chunk = same[i: i + 300]
                 for case, found in zip(chunk, sizes(chunk)):
-                    done[case.k] = case.result(*map(float, found))
+                    done[case.k], drawn[case.k] = case.result(*map(float, found)), case
         wanted = [k for k in wanted if not done[k][0]["reached"]]
+    reached = [k for k in sorted(done) if done[k][0]["reached"]]
+    levels_db = [db(drawn[k].level(done[k][0]["size"])) for k in reached]
+    for k, left in zip(reached, left_by_others([drawn[k] for k in reached], levels_db)):
+        done[k][0]["others_leave"] = float(left)
     return [done[k] for k in sorted(done)]
 
 

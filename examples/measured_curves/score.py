@@ -20,6 +20,7 @@ SHAPES = set().union(*SAME)  # another law has these, too
 ALL, CELL, SILENT = 0.01, 0.03, 0.10  # largest shares: names in part A, names in a cell of it, no name in part B
 LEAST = 34  # curves from which on a single name keeps a cell within its share
 LIMIT_S = 120
+DUE = 1  # a name is due where every other law leaves more than this many times the noise
 
 
 def command(matdb, truth, path, folder):
@@ -127,8 +128,9 @@ def is_a_shape(truth, answer):
 
 
 def missing(pairs):
-    """Part B: what is said where one effect is missing."""
-    counts = collections.defaultdict(collections.Counter)
+    """Part B: what is said where one effect is missing, and its name is due: no other law is the same curve in the noise."""
+    all_of_them, counts = pairs, collections.defaultdict(collections.Counter)
+    pairs = [(t, a) for t, a in pairs if t["others_leave"] > DUE]
     for t, a in pairs:
         row = counts[t["effect"]]
         row["curves"] += 1
@@ -150,6 +152,10 @@ def missing(pairs):
     wrong = sum(bool(a["effects"]) and not right(t["effect"], a["effects"]) for t, a in pairs)
     print(f"\nNo name: {share(silent, len(pairs))}, {silent / len(pairs):.1%}, at most {SILENT:.0%}. "
           f"Another name: {share(wrong, len(pairs))}.")
+    apart = [(t, a) for t, a in all_of_them if t["others_leave"] <= DUE]
+    verdicts = collections.Counter("named" if a["effects"] else a["verdict"] for _, a in apart)
+    print(f"Another law is the same curve in the noise, so that no name is due: {len(apart)}; "
+          + (", ".join(f"{name} {count}" for name, count in verdicts.most_common()) or "none"))
     return silent <= SILENT * len(pairs)
 
 

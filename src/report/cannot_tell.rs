@@ -133,6 +133,9 @@ fn would_help_curve(error: &CurveDiagnoseError) -> &'static str {
             "The scatter of a level, in dB: stated, from repeats, or from neighbouring angles, of which every incidence \
              has three or more."
         }
+        CurveDiagnoseError::Contradiction { .. } => {
+            "Repeats under the same conditions: a calibration of their common level, or one of them alone."
+        }
         CurveDiagnoseError::Fit(_) => "Another law to begin from.",
     }
 }

@@ -9,6 +9,11 @@ use super::select::{Addition, Selection, State};
 use super::terms::Term;
 use super::trust::are_trusted;
 
+/// How much better the declared model with terms must be than another model that explains the curve by itself, in ln p less
+/// Schwarz's penalty: odds of twenty to one. Terms that make the declared model the other one are no better.
+const FAR_BETTER: f64 = 3.0;
+/// Terms that only give a law another shape, as other laws have it.
+const SHAPES: [&str; 3] = ["diffuse-lobe", "limb-darkening", "second-lobe"];
 /// Name of the model that was asked for.
 pub(super) const DECLARED: &str = "declared";
 /// Other models to which terms are added, the likeliest first.
@@ -67,8 +72,9 @@ pub(super) struct Answer {
 }
 
 impl Answer {
-    /// The first of these that leaves no more than noise: the declared model, one of the others, one of them with terms. Where
-    /// a model explains all but a few isolated levels, terms are not tried.
+    /// The first of these that leaves no more than noise: the declared model, one of the others, one of them with terms. The
+    /// declared model with an effect that is no lobe comes before one of the others where it is far better. Where a model explains all but a few
+    /// isolated levels, terms are not tried.
     pub fn of(selection: &Selection, compared: &[Compared], terms: &[&'static dyn Term]) -> Answer {
         let (declared, others) = compared.split_at(1);
         let declared = &declared[0];
@@ -81,7 +87,13 @@ impl Answer {
             a.total_cmp(&b)
         });
         if let Some(best) = others.iter().find(|one| one.explains()) {
-            return Answer::without_terms(best, Vec::new());
+            let with = Answer::with_terms(selection, declared, terms);
+            let least = criterion(selection, &best.state) - FAR_BETTER;
+            let is_effect = with.added.iter().any(|one| !SHAPES.contains(&one.term.name()));
+            let is_far_better = is_effect
+                && with.unexplained.is_empty()
+                && criterion(selection, &with.after) < least;
+            return if is_far_better { with } else { Answer::without_terms(best, Vec::new()) };
         }
         for one in compared {
             let State { model, fitted, .. } = &one.state;

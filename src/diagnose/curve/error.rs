@@ -29,6 +29,20 @@ pub enum CurveDiagnoseError {
         /// Their width, degrees.
         width_deg: f64,
     },
+    /// Two repeats of the curve are of different levels.
+    #[error(
+        "repeats {} and {} of the angles contradict each other: they are {:.1} dB apart on average, and this difference \
+         scatters by {:.1} dB over the angles; find what changed between them, or diagnose each by itself",
+        .repeats[0], .repeats[1], .apart_db, .scatter_db
+    )]
+    Contradiction {
+        /// Their numbers, from 1, in the order of the file.
+        repeats: [usize; 2],
+        /// How far apart they are, dB.
+        apart_db: f64,
+        /// Standard deviation of the difference, dB.
+        scatter_db: f64,
+    },
     /// The noise is unknown.
     #[error(
         "the levels do not determine the noise: no incidence has three angles, none is repeated and no `sd_db` is \

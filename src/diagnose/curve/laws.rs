@@ -1,7 +1,9 @@
 //! Other scattering models, with which a curve is compared before any term: a lobe of another shape must not come out as
 //! an effect.
 
-use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Lambert, Shadowing, Sum};
+use crate::brdf::{
+    BlinnPhong, Brdf, CookTorrance, Correlation, Distribution, Kirchhoff, Lambert, Shadowing, Sum,
+};
 use crate::fit::model;
 
 /// Models by name, with values from which a search starts.
@@ -22,7 +24,15 @@ pub(super) fn other_laws() -> Vec<(&'static str, Brdf)> {
     });
     let diffuse = Brdf::BlinnPhong(BlinnPhong { r_s: 0.05, alpha: 5.0 });
     let diffuse = Brdf::Sum(Sum { parts: vec![flat(), diffuse] });
-    named.chain(two).chain([("a diffuse lobe over Lambert", diffuse)]).collect()
+    let exponential = model("kirchhoff").and_then(with_exponential_correlation);
+    let exponential = exponential.map(|law| ("kirchhoff with exponential correlation", law));
+    named.chain(two).chain([("a diffuse lobe over Lambert", diffuse)]).chain(exponential).collect()
+}
+
+/// Kirchhoff's law of heights whose correlation has no curvature at its peak, as machined and natural surfaces have it.
+fn with_exponential_correlation(law: Brdf) -> Option<Brdf> {
+    let Brdf::Kirchhoff(surface) = law else { return None };
+    Some(Brdf::Kirchhoff(Kirchhoff { correlation: Correlation::Exponential, ..surface }))
 }
 
 /// The default scattering model: one GGX lobe over Lambert, with values to start from.

@@ -83,6 +83,17 @@ pub struct Points {
     pub repeats: Vec<Vec<f64>>,
 }
 
+/// Two repeats of a curve that are of different levels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Contradiction {
+    /// Their numbers, from 1, in the order of the file.
+    pub repeats: [usize; 2],
+    /// Mean of the second less the first, dB.
+    pub apart_db: f64,
+    /// Standard deviation of that difference over the angles, dB.
+    pub scatter_db: f64,
+}
+
 /// Least noise of a file, dB: files round.
 const LEAST_NOISE_DB: f64 = 0.01;
 /// Quantile of the deviations that gives the noise: twice as precise as the median, and insensitive to a few bends.
@@ -91,7 +102,8 @@ const BELOW: f64 = 0.8;
 const SIZE: f64 = 1.2816;
 
 impl Points {
-    /// The points of a backscatter curve. Rows at grazing incidence, where σ⁰ does not determine f, are left out.
+    /// The points of a backscatter curve. Where angles are repeated, twice or more on average, and all were detected, they
+    /// become points of their mean level. Rows at grazing incidence, where σ⁰ does not determine f, are left out.
     pub fn backscatter(curve: &Curve, noise_db: Option<f64>) -> Points {
         const GRAZING_RAD: f64 = 1.569;
         let mut points: Vec<Point> = curve
@@ -115,34 +127,50 @@ impl Points {
             })
             .collect();
         points.sort_by(|a, b| a.theta_i_rad.total_cmp(&b.theta_i_rad));
-        Points::new(Kind::Backscatter, points, noise_db, None)
+        let groups = points.chunk_by(|a, b| place(a.theta_i_rad) == place(b.theta_i_rad));
+        let groups: Vec<Vec<Point>> = groups.map(<[Point]>::to_vec).collect();
+        // Angles of single chirps coincide by chance.
+        let are_repeats = points.len() >= 2 * groups.len();
+        if !are_repeats || points.iter().any(|point| point.censored) {
+            return Points::new(Kind::Backscatter, points, noise_db, None);
+        }
+        Points::of_groups(Kind::Backscatter, groups, noise_db, None)
     }
 
     /// The points of values in the plane of incidence; repeats become their mean level.
     pub fn in_plane(values: &[InPlane], noise_db: Option<f64>) -> Points {
-        let mut places: BTreeMap<[i64; 2], Vec<&InPlane>> = BTreeMap::new();
+        let mut places: BTreeMap<[i64; 2], Vec<Point>> = BTreeMap::new();
         for value in values {
-            let place = [value.theta_i_rad, value.theta_s_rad]
-                .map(|angle_rad| (angle_rad.to_degrees() * 1e4).round() as i64);
-            places.entry(place).or_default().push(value);
+            let key = [value.theta_i_rad, value.theta_s_rad].map(place);
+            places.entry(key).or_default().push(point_in_plane(value));
         }
-        let (mut points, mut levels) = (Vec::<Point>::new(), Vec::new());
         let mut scan = None;
-        for (place, values) in &places {
-            if let Some(point) = mean_point(values) {
-                let number = match scan {
-                    Some((incidence, number)) if incidence == place[0] => number,
-                    Some((_, number)) => number + 1,
-                    None => 0,
-                };
-                scan = Some((place[0], number));
-                points.push(Point { scan: number, ..point });
-                levels.push(values.iter().map(|one| db_from_ratio(one.f_per_sr)).collect());
-            }
+        for (key, group) in &mut places {
+            let number = match scan {
+                Some((incidence, number)) if incidence == key[0] => number,
+                Some((_, number)) => number + 1,
+                None => 0,
+            };
+            scan = Some((key[0], number));
+            group.iter_mut().for_each(|point| point.scan = number);
         }
-        let of_file = repeats(&places).or_else(|| stated(values));
-        let levels = if values.len() > places.len() { levels } else { Vec::new() };
-        Points { repeats: levels, ..Points::new(Kind::InPlane, points, noise_db, of_file) }
+        Points::of_groups(Kind::InPlane, places.into_values().collect(), noise_db, stated(values))
+    }
+
+    /// The points of these groups of repeats, each the mean of its levels.
+    fn of_groups(
+        kind: Kind,
+        groups: Vec<Vec<Point>>,
+        noise_db: Option<f64>,
+        stated: Option<Noise>,
+    ) -> Points {
+        let levels: Vec<Vec<f64>> =
+            groups.iter().map(|group| group.iter().map(|point| point.f_db).collect()).collect();
+        let points = groups.iter().filter_map(|group| mean_point(group)).collect();
+        let has_repeats = levels.iter().any(|levels| levels.len() > 1);
+        let of_file = repeats(&levels).or(stated);
+        let repeats = if has_repeats { levels } else { Vec::new() };
+        Points { repeats, ..Points::new(kind, points, noise_db, of_file) }
     }
 
     fn new(
@@ -184,6 +212,33 @@ impl Points {
         Points { kind: self.kind, points, noise, repeats: Vec::new() }
     }
 
+    /// Two repeats that are of different levels throughout, if there are any.
+    pub(super) fn contradiction(&self) -> Option<Contradiction> {
+        /// Points that two repeats must share to be compared.
+        const LEAST_SHARED: usize = 8;
+        /// Standard errors of the mean difference, and its size, dB, from which on it is no chance.
+        const ERRORS: f64 = 5.0;
+        const LEAST_DB: f64 = 1.0;
+        let most = self.repeats.iter().map(Vec::len).max().unwrap_or(0);
+        let pairs = (0..most).flat_map(|a| (a + 1..most).map(move |b| [a, b]));
+        let contradictions = pairs.filter_map(|[a, b]| {
+            let both =
+                self.repeats.iter().filter_map(|levels| Some(levels.get(b)? - levels.get(a)?));
+            let off: Vec<f64> = both.collect();
+            let count = off.len() as f64;
+            let mean_db = off.iter().sum::<f64>() / count;
+            let squares: f64 = off.iter().map(|db| (db - mean_db).powi(2)).sum();
+            let scatter_db = (squares / (count - 1.0)).sqrt();
+            let is_chance = mean_db.abs() < LEAST_DB.max(ERRORS * scatter_db / count.sqrt());
+            (off.len() >= LEAST_SHARED && !is_chance).then_some(Contradiction {
+                repeats: [a + 1, b + 1],
+                apart_db: mean_db,
+                scatter_db,
+            })
+        });
+        contradictions.max_by(|a, b| a.apart_db.abs().total_cmp(&b.apart_db.abs()))
+    }
+
     /// Measured less predicted levels, dB.
     pub(super) fn residuals_db(&self, levels_db: &[f64]) -> Vec<f64> {
         self.points.iter().zip(levels_db).map(|(point, db)| point.f_db - db).collect()
@@ -206,28 +261,37 @@ impl Points {
     }
 }
 
-/// Repeats of one pair of angles as a point of their mean level.
-fn mean_point(values: &[&InPlane]) -> Option<Point> {
-    let first = values.first()?;
-    let side = if first.theta_s_rad < 0.0 { PI } else { 0.0 };
-    let levels = values.iter().map(|value| db_from_ratio(value.f_per_sr));
-    Some(Point {
-        i: Direction::from_angles(first.theta_i_rad, PI),
-        o: Direction::from_angles(first.theta_s_rad.abs(), side),
-        theta_i_rad: first.theta_i_rad,
-        theta_s_rad: first.theta_s_rad,
-        f_db: levels.sum::<f64>() / values.len() as f64,
+/// An angle as a key that rounding does not change.
+fn place(angle_rad: f64) -> i64 {
+    (angle_rad.to_degrees() * 1e4).round() as i64
+}
+
+/// A value in the plane of incidence as a point.
+fn point_in_plane(value: &InPlane) -> Point {
+    let side = if value.theta_s_rad < 0.0 { PI } else { 0.0 };
+    Point {
+        i: Direction::from_angles(value.theta_i_rad, PI),
+        o: Direction::from_angles(value.theta_s_rad.abs(), side),
+        theta_i_rad: value.theta_i_rad,
+        theta_s_rad: value.theta_s_rad,
+        f_db: db_from_ratio(value.f_per_sr),
         censored: false,
         offset_db: 0.0,
         scan: 0,
-    })
+    }
 }
 
-/// Noise of a mean of repeats, from their scatter.
-fn repeats(places: &BTreeMap<[i64; 2], Vec<&InPlane>>) -> Option<Noise> {
+/// Repeats of a point as one of their mean level.
+fn mean_point(group: &[Point]) -> Option<Point> {
+    let first = group.first()?;
+    let sum: f64 = group.iter().map(|point| point.f_db).sum();
+    Some(Point { f_db: sum / group.len() as f64, ..*first })
+}
+
+/// Noise of a mean of repeats, from the scatter of the levels of each point.
+fn repeats(levels: &[Vec<f64>]) -> Option<Noise> {
     let (mut squares, mut spare, mut inverse) = (0.0, 0.0, 0.0);
-    for values in places.values() {
-        let levels: Vec<f64> = values.iter().map(|value| db_from_ratio(value.f_per_sr)).collect();
+    for levels in levels {
         let count = levels.len() as f64;
         let mean = levels.iter().sum::<f64>() / count;
         squares += levels.iter().map(|level| (level - mean).powi(2)).sum::<f64>();
@@ -237,7 +301,7 @@ fn repeats(places: &BTreeMap<[i64; 2], Vec<&InPlane>>) -> Option<Noise> {
     /// Degrees of freedom that a scatter needs.
     const LEAST_SPARE: f64 = 5.0;
     (spare >= LEAST_SPARE).then(|| Noise {
-        sd_db: (squares / spare * inverse / places.len() as f64).sqrt(),
+        sd_db: (squares / spare * inverse / levels.len() as f64).sqrt(),
         freedom: spare,
         source: NoiseSource::Repeats,
     })

@@ -7,7 +7,7 @@ use super::error::CurveDiagnoseError;
 use super::folds::Folds;
 use super::laws::other_laws;
 use super::model::{Model, Score};
-use super::points::{Points, f_per_sr};
+use super::points::{Contradiction, Points, f_per_sr};
 use super::remains;
 use super::report::{
     CurveBase, CurveBeforeAfter, CurveErrors, CurveFacts, CurveReport, CurveRow, CurveVerdict,
@@ -34,6 +34,10 @@ impl CurveDiagnosis {
         let detected = points.points.iter().filter(|point| !point.censored).count();
         if detected < LEAST_POINTS {
             return Err(CurveDiagnoseError::TooFew { detected });
+        }
+        if let Some(Contradiction { repeats, apart_db, scatter_db }) = points.contradiction() {
+            let apart_db = apart_db.abs();
+            return Err(CurveDiagnoseError::Contradiction { repeats, apart_db, scatter_db });
         }
         let noise_db = points.noise.sd_db;
         if noise_db == f64::INFINITY {

@@ -14,6 +14,8 @@ use super::terms::Term;
 const FOLLOWED: usize = 8;
 /// Terms of a round that are judged on held-out angles.
 const SHORT_LIST: usize = 5;
+/// How far one number of the law is moved to search again, in the coordinates of the search: levels and widths double.
+const MOVED: f64 = std::f64::consts::LN_2;
 /// Difference in held-out ln p below which two terms predict equally well; so does less than one standard error.
 const SAME: f64 = 2.0;
 
@@ -106,6 +108,8 @@ impl Selection<'_> {
             terms.par_iter().map(|term| self.trial(round, state, *term)).collect();
         trials.sort_by(|a, b| b.ranked.gain.total_cmp(&a.ranked.gain));
         let least_gain = self.settings.least_gain;
+        trials.par_iter_mut().take(SHORT_LIST).for_each(|trial| self.search_again(trial));
+        trials.sort_by(|a, b| b.ranked.gain.total_cmp(&a.ranked.gain));
         for trial in trials.iter_mut().take(SHORT_LIST).filter(|t| t.ranked.gain >= least_gain) {
             let with = self.state(trial.model.clone(), trial.fitted.clone());
             trial.ranked.held_out = Some(self.gain(&state.held_out, &with.held_out));
@@ -146,6 +150,24 @@ impl Selection<'_> {
             accepted: false,
         };
         Trial { term, ranked, state: None, model, fitted }
+    }
+
+    /// Searches a term once more from laws beside the one found: the law without the term may lie in another valley.
+    fn search_again(&self, trial: &mut Trial) {
+        let all = vec![true; self.points.points.len()];
+        let coordinates = &trial.model.coordinates;
+        let (lower, upper, numbers) =
+            (coordinates.lower(), coordinates.upper(), 0..coordinates.len());
+        for (number, step) in numbers.flat_map(|number| [(number, MOVED), (number, -MOVED)]) {
+            let mut start = trial.fitted.at.clone();
+            start[number] = (start[number] + step).clamp(lower[number], upper[number]);
+            let found = trial.model.fit(self.points, &all, &start);
+            if found.log_p > trial.fitted.log_p {
+                trial.ranked.gain += found.log_p - trial.fitted.log_p;
+                trial.ranked.converged = found.converged;
+                trial.fitted = found;
+            }
+        }
     }
 
     /// The supported term with the largest held-out gain.

@@ -85,10 +85,15 @@ macro_rules! described {
     };
 }
 
+/// The specular and the diffuse part of a law at a point, 1/sr.
+fn parts_per_sr(law: &Brdf, point: &Point) -> [f64; 2] {
+    let Seen { f_per_sr, specular_share, .. } = law.seen_by(0.0, point.i, point.o);
+    [specular_share, 1.0 - specular_share].map(|share| share * f_per_sr)
+}
+
 /// The diffuse part of a law at a point, 1/sr.
 fn diffuse_per_sr(law: &Brdf, point: &Point) -> f64 {
-    let Seen { f_per_sr, specular_share, .. } = law.seen_by(0.0, point.i, point.o);
-    (1.0 - specular_share) * f_per_sr
+    parts_per_sr(law, point)[1]
 }
 
 /// Cosine between the normal and the half direction, and between that and the receiver.
@@ -267,7 +272,7 @@ impl Term for ThinFilm {
     fn scatter(&self, values: &[f64], law: &Brdf, point: &Point, f_per_sr: f64) -> f64 {
         let &[visibility, _] = values else { return f_per_sr };
         let phase_rad = ThinFilm::phase_rad(values, point);
-        f_per_sr + lobes_per_sr(law, point, &|_| visibility * phase_rad.cos())
+        f_per_sr + parts_per_sr(law, point)[0] * visibility * phase_rad.cos()
     }
 }
 
@@ -317,14 +322,14 @@ impl Term for AngleOffset {
         "angle-offset",
         Instrument,
         "The receiver stands at another angle than the file says, or the sample is tilted by half as \
-         much: every angle is off by offset_deg.",
+         much: every angle is off by offset_deg. A level of backscatter is the σ⁰ of the other angle.",
         "The peaks of all incidences are shifted to the same side by the same angle, and each flank errs \
          by its slope.",
         EffectParameter::new("offset_deg", "deg", [-10.0, 10.0], 0.0, 0.1),
     );
 
     fn starts(&self) -> Vec<Vec<f64>> {
-        [-1.0, 1.0].map(|offset| vec![offset]).to_vec()
+        [-9.0, -6.0, -3.0, -1.0, 1.0, 3.0, 6.0, 9.0].map(|offset| vec![offset]).to_vec()
     }
 
     fn scatter(&self, values: &[f64], law: &Brdf, point: &Point, f_per_sr: f64) -> f64 {
@@ -341,7 +346,10 @@ impl Term for AngleOffset {
         let o = Direction::from_angles(theta_rad.abs(), if theta_rad < 0.0 { PI } else { 0.0 });
         let i = if is_backscatter { o } else { point.i };
         let here = law.f_per_sr(point.i, point.o);
-        if here > 0.0 { f_per_sr * law.f_per_sr(i, o) / here } else { f_per_sr }
+        let ratio = if here > 0.0 { law.f_per_sr(i, o) / here } else { 1.0 };
+        // σ⁰ = 4π·f·cos²θ was turned into f at the angle of the file.
+        let cosines = if is_backscatter { o.cos_theta() / point.o.cos_theta() } else { 1.0 };
+        f_per_sr * ratio * cosines.powi(2)
     }
 }
 
