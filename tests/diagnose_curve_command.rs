@@ -1,17 +1,13 @@
-//! Promise: `matdb diagnose --curve` names what a curve's law lacks, in files and on the terminal, and
-//! finds in measured coatings the structure that one lobe and Lambert leave.
+//! Promise: `matdb diagnose --curve` names what a curve's law lacks, in files and on the terminal.
 
 mod support;
 
-use std::collections::BTreeMap;
-use std::f64::consts::PI;
 use std::fs;
 use std::path::Path;
 
 use matdb::brdf::Scattering;
 use matdb::diagnose::curve::{Points, base_law, term};
-use matdb::formats::ColumnNames;
-use matdb::measure::in_plane::{InPlane, read_table};
+use matdb::measure::in_plane::InPlane;
 use serde_json::Value;
 use support::{entries, matdb, refused};
 
@@ -156,101 +152,5 @@ fn what_means_nothing_is_refused_in_a_sentence() {
         let (first, flag) = (message.lines().next().unwrap(), flag.split(' ').next().unwrap());
         assert!(first.contains(flag) && first.contains("cannot be used with"), "{message}");
         assert!(!at.join("more").exists());
-    }
-}
-
-/// Rows of a CSV by column.
-fn records(path: &Path) -> Vec<BTreeMap<String, String>> {
-    let mut reader = csv::Reader::from_path(path).unwrap();
-    reader.deserialize().map(Result::unwrap).collect()
-}
-
-/// Tables in the plane of incidence of the coatings, with the mean blank taken off.
-fn coatings(folder: &Path) -> BTreeMap<String, String> {
-    let place = |r: &BTreeMap<String, String>| {
-        ["scan", "incidence_deg", "receive_deg"].map(|column| r[column].clone())
-    };
-    let in_plane = |r: &BTreeMap<String, String>| r["azimuth_deg"] == "-90";
-    let mut blanks: BTreeMap<[String; 3], Vec<f64>> = BTreeMap::new();
-    for record in records(&folder.join("blanks.csv")).iter().filter(|r| in_plane(r)) {
-        blanks.entry(place(record)).or_default().push(record["rt"].parse().unwrap());
-    }
-    let mut tables = BTreeMap::new();
-    for record in records(&folder.join("samples.csv")).iter().filter(|r| in_plane(r)) {
-        let [i, s, rt] = ["incidence_deg", "receive_deg", "rt"]
-            .map(|column| record[column].parse::<f64>().unwrap());
-        let blank =
-            blanks.get(&place(record)).map_or(0.0, |b| b.iter().sum::<f64>() / b.len() as f64);
-        let f = (rt - blank) / (PI * s.to_radians().cos());
-        // The detector stands in the beam there; below is stray light.
-        if (i + s).abs() > 4.9 && f > 1e-3 {
-            let header = || "theta_i_deg,theta_s_deg,brdf_per_sr\n".to_owned();
-            *tables.entry(record["sample"].clone()).or_insert_with(header) +=
-                &format!("{i},{s},{f}\n");
-        }
-    }
-    tables
-}
-
-/// A diagnosis as a line of the table in `docs/diagnosing-a-curve.md`.
-fn line(file: &str, report: &Value) -> String {
-    let rmse_db = number(&report["error"]["before"]["rmse_db"]);
-    let noise_db = number(&report["error"]["noise_floor_db"]);
-    let may_be = report["may_be"].as_array().unwrap().iter();
-    let may_be = may_be.map(|name| format!("`{}`", name.as_str().unwrap()));
-    let unknown = report["unexplained"].as_array().unwrap().iter().map(|unknown| {
-        let covariate = unknown["covariate"].as_str().unwrap();
-        format!("{:.2} dB with {covariate}", number(&unknown["strength_db"]))
-    });
-    let listed = |all: Vec<String>| if all.is_empty() { "–".to_owned() } else { all.join(", ") };
-    let [may_be, unknown] = [may_be.collect(), unknown.collect()].map(listed);
-    format!(
-        "| `{file}` | {} | {rmse_db:.2} | {noise_db:.2} | {may_be} | {unknown} |",
-        report["curve"]["points"]
-    )
-}
-
-#[test]
-fn structure_is_found_in_measured_coatings() {
-    let beside =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/ua-loft-black-coatings");
-    let data = std::env::var_os("MATDB_COATINGS").map_or(beside, Into::into);
-    if !data.exists() {
-        println!("skipped: MATDB_COATINGS names no folder with the tables of the coatings");
-        return;
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    for (name, table) in coatings(&data) {
-        let (points, _) = read_table(table.as_bytes(), &ColumnNames::default()).unwrap();
-        assert!(points.len() > 100, "{name}");
-        fs::write(at.join(format!("{name}.csv")), table).unwrap();
-    }
-    /// What the provenance of the data says that one lobe and Lambert leave, dB, with room.
-    const LEFT_DB: [f64; 2] = [0.4, 2.0];
-    println!("| curve | levels | residual | noise | may be | unknown |");
-    for file in entries(at) {
-        matdb(at).args(["diagnose", "-q", "--curve", &file, "-o", "out"]).assert().success();
-        let report = json(&at.join("out/report.json"));
-        let before = number(&report["error"]["before"]["rmse_db"]);
-        let noise_db = number(&report["error"]["noise_floor_db"]);
-        println!("{}", line(&file, &report));
-        assert_eq!(report["verdict"], "unexplained", "{file}");
-        assert!((LEFT_DB[0]..LEFT_DB[1]).contains(&before), "{file}: {before}");
-        assert!((0.05..0.3).contains(&noise_db) && before > 2.0 * noise_db, "{file}: {noise_db}");
-        for unknown in report["unexplained"].as_array().unwrap() {
-            assert!(number(&unknown["strength_db"]) > noise_db, "{file}: {unknown}");
-        }
-        // No law that was tried leaves no more than noise, so that nothing has a name: not even in the mounts of one
-        // sample that a film would improve.
-        assert_eq!(report["effects"], serde_json::json!([]), "{file}");
-    }
-    for name in ["AnoBlackEC1onAlum", "AnoBlackEC2onAlum", "AnoBlackNiTEonSteel"] {
-        let file = data.join(format!("{name}.bsdf"));
-        let file = file.to_str().unwrap();
-        matdb(at).args(["diagnose", "-q", "--curve", file, "-o", "out"]).assert().success();
-        let report = json(&at.join("out/report.json"));
-        println!("{}", line(&format!("{name}.bsdf"), &report));
-        assert_eq!(report["verdict"], "unexplained", "{name}");
     }
 }
