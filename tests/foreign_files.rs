@@ -233,7 +233,8 @@ fn clouds_that_say_too_little_or_too_much_are_refused_with_the_way_out() {
             "a.csv",
             "X,Y,Z,I\n1,2,3,-60\n",
             "",
-            "no column power_dbm; it has: x, y, z, i; say which it is by --columns THEIRS=power_dbm",
+            "no column power_dbm (power_w for watts; power_db for decibels of an unknown level, power_counts for counts); it has: X, Y, Z, I; \
+             say which they are, as by --columns THEIRS=power_dbm",
         ),
         (
             "b.csv",

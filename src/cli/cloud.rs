@@ -10,6 +10,7 @@ use crate::frames::{Global, Point, Pose};
 use crate::material::Scale;
 use crate::measure::{Cloud, CloudError, CloudReading, PowerUnit, Start};
 use crate::radar::Radar;
+use crate::report::shell_word;
 use crate::setup::{read_cloud, read_pose};
 
 /// A cloud file and what it does not say of itself.
@@ -64,6 +65,29 @@ enum Frame {
 }
 
 impl CloudArgs {
+    /// The flags as they were given, for another command on the same file; with a blank before each.
+    pub fn again(&self, columns: &ColumnArgs) -> String {
+        let unit = match self.unit {
+            LengthUnit::M => "",
+            LengthUnit::Mm => " --unit mm",
+        };
+        let power = match self.power {
+            PowerFlag::Dbm => "",
+            PowerFlag::W => " --power w",
+            PowerFlag::Relative => " --power relative",
+            PowerFlag::Counts => " --power counts",
+        };
+        let frame = match self.frame {
+            Frame::Global => "",
+            Frame::Target => " --frame target",
+        };
+        let columns = columns
+            .columns
+            .as_ref()
+            .map(|names| format!(" --columns {}", shell_word(names.to_string().as_ref())));
+        format!("{}{unit}{power}{frame}", columns.unwrap_or_default())
+    }
+
     /// Reads the cloud; `radar` says where its target frame lies.
     pub fn read(&self, columns: &ColumnArgs, radar: &Radar) -> Result<Cloud, Error> {
         self.read_another(&self.cloud, columns, radar)

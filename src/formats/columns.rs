@@ -1,5 +1,6 @@
 //! Other people's names of columns.
 
+use std::fmt;
 use std::str::FromStr;
 
 use super::error::FormatError;
@@ -38,6 +39,15 @@ impl FromStr for ColumnNames {
             )),
         });
         Ok(ColumnNames { pairs: pairs.collect::<Result<_, _>>()? })
+    }
+}
+
+impl fmt::Display for ColumnNames {
+    /// As it is given.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let pairs: Vec<String> =
+            self.pairs.iter().map(|(theirs, ours)| format!("{theirs}={ours}")).collect();
+        f.write_str(&pairs.join(","))
     }
 }
 
@@ -113,6 +123,8 @@ mod tests {
         assert_eq!(renamed("X=x_m, Intensity=power_dbm").unwrap()[..3], ["x_m", "Y", "power_dbm"]);
         assert_eq!(renamed("X=Y,Intensity=X").unwrap()[..3], ["Y", "Y", "X"], "all at once");
         assert_eq!(renamed("X=-").unwrap()[0], "");
+        let names: ColumnNames = "X=x_m, Y=-".parse().unwrap();
+        assert_eq!(names.to_string(), "X=x_m,Y=-");
     }
 
     #[test]

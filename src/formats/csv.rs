@@ -1,7 +1,8 @@
 //! Tables of text with a header, in one dialect, and errors that name the line and the column.
 //!
 //! Cells are separated by what the header line has most of: commas, semicolons or tabs; blanks where it has none of
-//! these. Where commas do not separate, one comma in a number is its decimal sign, as in `-3,5`. A byte order mark and
+//! these. Where commas do not separate, one comma in a number is its decimal sign, as in `-3,5`. In a first line of such
+//! numbers the commas do not count. A byte order mark and
 //! lines of `#` or `//` at the head are passed over.
 
 use csv::StringRecord;
@@ -269,6 +270,9 @@ impl Separator {
     fn of(bytes: &[u8]) -> Separator {
         let lines = bytes.split(|byte| *byte == b'\n');
         let first = lines.map(<[u8]>::trim_ascii).find(|line| !line.is_empty()).unwrap_or(b"");
+        if let Some(separator) = Separator::of_decimal_commas(first) {
+            return separator;
+        }
         let mut is_quoted = false;
         let mut counts = [(b',', 0), (b';', 0), (b'\t', 0)];
         for byte in first {
@@ -281,6 +285,28 @@ impl Separator {
             Some(&(mark, 1..)) => Separator::Byte(mark),
             _ if first.contains(&b' ') => Separator::Blanks,
             _ => Separator::Byte(b','),
+        }
+    }
+
+    /// What separates numbers with decimal commas, where a line has nothing else.
+    fn of_decimal_commas(line: &[u8]) -> Option<Separator> {
+        let line = std::str::from_utf8(line).ok()?;
+        let is_number = |cell: &str| match cell.trim().split_once(',') {
+            Some((_, "")) => false,
+            _ => parse(cell.trim(), true).is_some(),
+        };
+        let has_numbers = |cells: &[&str]| {
+            let has_comma = cells.iter().any(|cell| cell.contains(','));
+            cells.len() > 1 && has_comma && cells.iter().all(|cell| is_number(cell))
+        };
+        let by = |mark: char| line.split(mark).collect::<Vec<&str>>();
+        let words: Vec<&str> = line.split_whitespace().collect();
+        if has_numbers(&by(';')) {
+            Some(Separator::Byte(b';'))
+        } else if has_numbers(&by('\t')) {
+            Some(Separator::Byte(b'\t'))
+        } else {
+            has_numbers(&words).then_some(Separator::Blanks)
         }
     }
 
@@ -350,6 +376,19 @@ mod tests {
 
     fn read(text: &str) -> Result<Table, FormatError> {
         Table::read(text.as_bytes(), &["theta_deg"], &["sigma0_db"])
+    }
+
+    #[test]
+    fn decimal_commas_do_not_separate_where_there_is_no_header() {
+        for text in ["1,5;2,25;3\n4;5;6\n", "1,5\t2,25\t3\n4\t5\t6\n", "1,5 2,25 3\n4 5 6\n"] {
+            let table = Table::parse(text.as_bytes(), Names::WhereTheyAre).unwrap();
+            assert_eq!((table.columns().count(), table.len()), (3, 2), "{text}");
+            assert_eq!(table.number(0, "2").unwrap(), Some(2.25), "{text}");
+        }
+        for text in ["1,5,2\n", "1, 5, 2\n", "1,5\n", "1.5,2.5;3\n"] {
+            let table = Table::parse(text.as_bytes(), Names::WhereTheyAre).unwrap();
+            assert_eq!(table.separator, Separator::Byte(b','), "{text}");
+        }
     }
 
     #[test]

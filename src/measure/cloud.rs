@@ -70,8 +70,8 @@ pub enum CloudError {
     },
     /// Lengths that no target of this radar has.
     #[error(
-        "the cloud is {size_m:.0} m across, beyond {LARGEST_M} m; is the file in millimetres? state \
-         its unit"
+        "the cloud is {size_m:.0} m across, beyond {LARGEST_M} m; is the file in millimetres? say --unit mm, or name its \
+         columns x_mm, y_mm and z_mm"
     )]
     TooLarge {
         /// Diagonal of the bounding box, m.
@@ -120,15 +120,17 @@ pub enum CloudError {
         /// Point, from 0.
         second: usize,
     },
-    /// The header of a cloud file lacks a column.
+    /// The header of a cloud file lacks columns.
     #[error(
-        "the file has no column {column}; it has: {found}; say which it is by --columns THEIRS={column}"
+        "the file has no {missing}; it has: {found}; say which they are, as by --columns {example}"
     )]
-    MissingColumn {
-        /// The column that is missing.
-        column: String,
+    MissingColumns {
+        /// The columns that are missing, in words.
+        missing: String,
         /// The columns of the file.
         found: String,
+        /// What the flag would say.
+        example: String,
     },
     /// Powers in two units.
     #[error("the file has both {first} and {second}; pass one over, as by --columns {second}=-")]

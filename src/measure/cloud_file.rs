@@ -13,6 +13,7 @@
 use glam::DVec3;
 
 use super::cloud::{Cloud, CloudError, CloudPoint, POSSIBLE_DBM};
+use crate::formats::words::significant;
 use crate::formats::{ColumnNames, PointFormat, PointTable};
 use crate::frames::{Global, Point, Pose, Target};
 use crate::material::Scale;
@@ -116,11 +117,13 @@ impl CloudReading {
     pub fn read(&self, format: PointFormat, bytes: &[u8]) -> Result<Cloud, CloudError> {
         let mut table = PointTable::read(format, bytes)?;
         table.rename(&self.columns)?;
+        let theirs: Vec<String> = table.names().into_iter().map(str::to_owned).collect();
         table.lower_case();
         table.check_names()?;
         if table.is_empty() {
             return Err(CloudError::Empty);
         }
+        check_columns(&table, &theirs)?;
         let places = self.places(&table)?;
         let ranges_m = self.ranges_m(&table)?;
         let chirps = table.column("chirp")?;
@@ -140,6 +143,7 @@ impl CloudReading {
             check_unit(&powers)?;
         }
         cloud.scale = unit.scale();
+        cloud.notices.extend(too_strong(&powers, unit));
         cloud.notices.extend(table.notices.iter().cloned());
         cloud.notices.extend(table.passed_over(&[&KNOWN[..], &BESIDE_THE_MEASURED].concat()));
         Ok(cloud)
@@ -152,7 +156,8 @@ impl CloudReading {
         let mut found = units.into_iter();
         let found = found.find(|(unit, _)| names.contains(&format!("x{unit}").as_str()));
         let (unit, metres) = found.unwrap_or(units[2]);
-        let [xs, ys, zs] = ["x", "y", "z"].map(|axis| required(table, &format!("{axis}{unit}")));
+        let column = |axis| Ok(table.full_column(&format!("{axis}{unit}"))?.unwrap_or_default());
+        let [xs, ys, zs]: [Result<Vec<f64>, CloudError>; 3] = ["x", "y", "z"].map(column);
         let (xs, ys, zs) = (xs?, ys?, zs?);
         let places = std::iter::zip(xs, std::iter::zip(ys, zs));
         Ok(places.map(|(x, (y, z))| DVec3::new(x, y, z) * metres).collect())
@@ -185,7 +190,8 @@ impl CloudReading {
                 let powers = table.full_column(name)?.unwrap_or_default();
                 Ok((powers, self.power.of_column(unit)))
             }
-            _ => Err(missing(table, "power_dbm")),
+            // `check_columns` has found one.
+            _ => Ok((vec![f64::NAN; table.len()], self.power)),
         }
     }
 
@@ -226,12 +232,48 @@ fn check_unit(levels_dbm: &[f64]) -> Result<(), CloudError> {
     if are_dbm { Ok(()) } else { Err(CloudError::Watts { points: levels_dbm.len(), largest }) }
 }
 
-fn required(table: &PointTable, column: &str) -> Result<Vec<f64>, CloudError> {
-    table.full_column(column)?.ok_or_else(|| missing(table, column))
+/// Refuses a table without a place or a power, and says all that it lacks.
+fn check_columns(table: &PointTable, theirs: &[String]) -> Result<(), CloudError> {
+    let names = table.names();
+    let lacks_all = |columns: &[&str]| !columns.iter().any(|column| names.contains(column));
+    let axes = [["x", "x_m", "x_mm"], ["y", "y_m", "y_mm"], ["z", "z_m", "z_mm"]];
+    // All three have the unit of the first.
+    let unit =
+        ["_m", "_mm", ""].into_iter().find(|unit| names.contains(&format!("x{unit}").as_str()));
+    let lacking = axes.iter().filter(|axis| match unit {
+        Some(unit) => !names.contains(&format!("{}{unit}", axis[0]).as_str()),
+        None => true,
+    });
+    let places: Vec<String> =
+        lacking.map(|axis| format!("{}{}", axis[0], unit.unwrap_or("_m"))).collect();
+    let has_no_power = lacks_all(&["power_dbm", "power_w", "power_db", "power_counts", "power"]);
+    if places.is_empty() && !has_no_power {
+        return Ok(());
+    }
+    let is_plural = places.len() + usize::from(has_no_power) > 1;
+    let mut missing = format!("column{} {}", if is_plural { "s" } else { "" }, places.join(", "));
+    let mut example: Vec<String> = places.iter().map(|place| format!("THEIRS={place}")).collect();
+    if has_no_power {
+        let and = if places.is_empty() { "" } else { " and " };
+        missing += and;
+        missing += "power_dbm (power_w for watts; power_db for decibels of an unknown level, power_counts for counts)";
+        example.push("THEIRS=power_dbm".to_owned());
+    }
+    let found: Vec<&str> =
+        theirs.iter().map(String::as_str).filter(|name| !name.is_empty()).collect();
+    Err(CloudError::MissingColumns { missing, found: found.join(", "), example: example.join(",") })
 }
 
-fn missing(table: &PointTable, column: &str) -> CloudError {
-    CloudError::MissingColumn { column: column.to_owned(), found: table.names().join(", ") }
+/// A sentence on powers that no radar receives: they are of an unknown level.
+fn too_strong(powers: &[f64], unit: PowerUnit) -> Option<String> {
+    let strongest = powers.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    (unit == PowerUnit::Dbm && strongest > 0.0).then(|| {
+        format!(
+            "the strongest point has {} dBm, more than a radar receives; where these are decibels of an unknown level, name the \
+             column power_db or say --power relative",
+            significant(strongest, 3)
+        )
+    })
 }
 
 fn chirp_number(point: usize, value: f64) -> Result<u32, CloudError> {

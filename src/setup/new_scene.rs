@@ -69,7 +69,8 @@ impl NewScene<'_> {
         let name = self.scene_file.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let files = vec![(name, text.into_bytes()), (rays_name, rays.into_bytes())];
         let scene = self.load(&files)?;
-        let notices = off_the_mesh(&scene, middle).into_iter().collect();
+        let far = far_away(radar_at.distance_m(middle));
+        let notices = far.into_iter().chain(off_the_mesh(&scene, middle)).collect();
         Ok(MadeScene { files, radar_at, how, notices })
     }
 
@@ -178,6 +179,7 @@ impl NewScene<'_> {
              \n\
              [radar.beam]\n\
              focus_m = {range_m}                    # where the spot is smallest: levels depend on it\n\
+             edge_growth = 1.5                  # the spot half a metre from the middle over that in it; 1 where it does not grow\n\
              \n\
              [radar.scan]\n\
              pattern = \"rays\"\n\
@@ -229,6 +231,18 @@ impl NewScene<'_> {
         }
         Ok(Scene::resolve(file, &folder.path().join(&files[0].0))?)
     }
+}
+
+/// A sentence on a radar that stands so far from its points as none of these does.
+fn far_away(range_m: f64) -> Option<String> {
+    /// Farther than any radar of this kind looks, m.
+    const FAR_RADAR_M: f64 = 100.0;
+    (range_m > FAR_RADAR_M).then(|| {
+        format!(
+            "the radar stood {} m from the points: are --radar-at and the cloud in metres?",
+            significant(range_m, 4)
+        )
+    })
 }
 
 /// A sentence on a cloud, of this middle, that is not where the mesh is.

@@ -65,9 +65,10 @@ pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let names: Vec<&str> = made.files.iter().map(|(name, _)| name.as_str()).collect();
     let text = format!(
         "the radar stood at {x:.3}, {y:.3}, {z:.3} m ({how})\nwrote {}: read its comments, then run\n  \
-         matdb measure {} --scene {scene} -o measured\n",
+         matdb measure {} --scene {scene}{} -o measured\n",
         names.join(" and "),
         args.cloud.cloud.display(),
+        args.cloud.again(&args.columns),
     );
     let value = json!({ "radar_at_m": [x, y, z], "how": how, "files": names });
     console.result(&text, &value)
