@@ -378,8 +378,12 @@ fn row(material: &Material) -> String {
     let model = model["model"].as_str().unwrap().to_owned();
     let kind = material.render_kind().unwrap().as_str();
     let ghz = matdb::units::range(material.frequency_hz.map(|f| f / 1e9));
-    let literature = material.sources.iter().filter(|s| s.kind == SourceKind::Literature);
-    let keys: Vec<&str> = literature.map(|s| s.key.as_str()).collect();
+    let known = material.sources.iter().filter_map(|s| match s.kind {
+        SourceKind::Literature => Some(s.key.clone()),
+        SourceKind::Measured => Some(format!("{} (measured)", s.key)),
+        _ => None,
+    });
+    let keys: Vec<String> = known.collect();
     let keys = if keys.is_empty() { "nothing".to_owned() } else { keys.join(", ") };
     format!("| `{}` | {model} | {kind} | {ghz} | {keys} |", material.slug)
 }
