@@ -26,6 +26,17 @@ pub fn digits(value: f64) -> String {
     true_minus(&significant(value, 4))
 }
 
+/// A number that somebody stated, in the digits in which it was typed, with a true minus. A change of unit leaves nothing of
+/// itself in ten digits.
+///
+/// ```
+/// assert_eq!(matdb::formats::words::as_typed(2.4945), "2.4945");
+/// assert_eq!(matdb::formats::words::as_typed(0.00052 * 1e3), "0.52");
+/// ```
+pub fn as_typed(value: f64) -> String {
+    true_minus(&significant(value, 10))
+}
+
 /// Text whose hyphens are minus signs.
 pub fn true_minus(number: &str) -> String {
     number.replace('-', "−")

@@ -6,7 +6,7 @@ use super::entry::place_of;
 use super::quantity::quantity;
 use super::spectra::{self, SpectrumView};
 use crate::effects::find;
-use crate::formats::words::{digits, plus_minus};
+use crate::formats::words::{as_typed, digits, plus_minus};
 use crate::material::{Finding, FindingVerdict, Layer, Material, Permittivity, Session, Status};
 
 /// These parts as the page of a material shows them.
@@ -85,16 +85,16 @@ fn status(status: &Status) -> Option<StatusView> {
 
 fn roughness(material: &Material) -> Option<(String, usize)> {
     let roughness = material.roughness.as_ref()?;
-    let mut text = format!("{} µm rms", digits(roughness.rms_height_m * 1e6));
+    let mut text = format!("{} µm rms", as_typed(roughness.rms_height_m * 1e6));
     if let Some(length_m) = roughness.correlation_length_m {
-        text += &format!(", correlated over {} µm", digits(length_m * 1e6));
+        text += &format!(", correlated over {} µm", as_typed(length_m * 1e6));
     }
     text += &roughness.method.as_ref().map_or(String::new(), |method| format!(", {method}"));
     Some((text, place_of(material, &roughness.source)))
 }
 
 fn layer(material: &Material, layer: &Layer) -> LayerView {
-    let thickness = layer.thickness_m.map(|m| digits(m * 1e3));
+    let thickness = layer.thickness_m.map(|m| as_typed(m * 1e3));
     LayerView {
         cells: [
             layer.name.clone(),
@@ -107,11 +107,11 @@ fn layer(material: &Material, layer: &Layer) -> LayerView {
 
 fn permittivity(material: &Material, entry: &Permittivity) -> PermittivityView {
     let from = entry.frequency_source.as_ref().map_or(String::new(), |key| format!(", {key}"));
-    let celsius = entry.temperature_k.map(|k| digits(k - 273.15));
+    let celsius = entry.temperature_k.map(|k| as_typed(k - 273.15));
     PermittivityView {
         cells: [
             entry.key.clone(),
-            digits(entry.frequency_hz / 1e9) + &from,
+            as_typed(entry.frequency_hz / 1e9) + &from,
             celsius.unwrap_or("not stated".to_owned()),
             with_sd(entry.real, entry.real_sd),
             with_sd(entry.imaginary, entry.imaginary_sd),
@@ -123,7 +123,7 @@ fn permittivity(material: &Material, entry: &Permittivity) -> PermittivityView {
 
 /// A number that a source states, in the digits that it states, which rounding to its deviation would change.
 fn with_sd(value: f64, sd: Option<f64>) -> String {
-    digits(value) + &sd.map_or(String::new(), |sd| format!(" ± {}", digits(sd)))
+    as_typed(value) + &sd.map_or(String::new(), |sd| format!(" ± {}", as_typed(sd)))
 }
 
 fn session(session: &Session) -> SessionView {

@@ -7,7 +7,7 @@ use super::entry::{kind_of, place_of};
 use super::residuals;
 use super::words::grouped;
 use crate::brdf::Parameter;
-use crate::formats::words::digits;
+use crate::formats::words::{as_typed, digits};
 use crate::material::{
     ChosenBy, CrossValidation, Fit, FitNumber, FitReport, Goodness, Material, SourceKind,
 };
@@ -144,7 +144,7 @@ fn parameter(
     let (told, is_told) = in_words(fit, path, own_told, stored_sd);
     ParameterView {
         path: path.clone(),
-        value: digits(parameter.value),
+        value: if fit.is_fitted() { digits(parameter.value) } else { as_typed(parameter.value) },
         unit: parameter.unit,
         sd: own_told.and_then(|told| told.sd).or(stored_sd).map(digits),
         interval: own_told.and_then(|told| told.interval_95).map(interval),
