@@ -352,7 +352,7 @@ mod tests {
     fn hostile_files_are_refused_with_their_place() {
         let refused = |format, bytes: &[u8]| metres().read(format, bytes).unwrap_err().to_string();
         assert!(
-            refused(PointFormat::Xyz, b"0 0 0\n").contains("no column power_dbm; it has: x, y, z")
+            refused(PointFormat::Xyz, b"0 0 0\n").contains("column power_dbm (power_w for watts")
         );
         assert!(refused(PointFormat::Xyz, b"#\n0 0 0 nan\n").starts_with("line 2"));
         assert!(refused(PointFormat::Xyz, b"0 0 \xff").contains("line 1: the text is not UTF-8"));
@@ -381,7 +381,37 @@ mod tests {
         assert!((cloud.points()[0].power_w / watts_from_dbm(-60.5) - 1.0).abs() < 1e-12);
         assert!(cloud.notices.contains(&"these columns are passed over: time".to_owned()));
         let none = metres().read(PointFormat::Csv, text).unwrap_err().to_string();
-        assert!(none.contains("no column power_dbm; it has: x, y, z, intensity, time;"), "{none}");
+        assert!(none.contains("no column power_dbm (power_w"), "{none}");
+        assert!(none.contains("it has: X, Y, Z, Intensity, Time; say which they are"), "{none}");
+    }
+
+    #[test]
+    fn all_that_a_file_lacks_is_said_at_once() {
+        let read = |text: &[u8]| metres().read(PointFormat::Csv, text);
+        let error = read(b"east,north,up,refl\n1,2,3,-60\n").unwrap_err().to_string();
+        assert!(
+            error.starts_with("the file has no columns x_m, y_m, z_m and power_dbm ("),
+            "{error}"
+        );
+        let example = "--columns THEIRS=x_m,THEIRS=y_m,THEIRS=z_m,THEIRS=power_dbm";
+        assert!(
+            error.contains("it has: east, north, up, refl;") && error.ends_with(example),
+            "{error}"
+        );
+        let error = read(b"x_mm,y_m,z_mm,power_dbm\n1,2,3,-60\n").unwrap_err().to_string();
+        assert!(error.starts_with("the file has no column y_mm; it has: x_mm, y_m,"), "{error}");
+    }
+
+    #[test]
+    fn more_than_a_radar_receives_is_perhaps_of_another_unit() {
+        let read = |text: &[u8]| metres().read(PointFormat::Csv, text).unwrap().notices.join("\n");
+        let said = read(b"x,y,z,power_dbm\n0,0,1,49.5\n1,0,1,-3\n");
+        assert!(
+            said.contains("the strongest point has 49.5 dBm, more than a radar receives"),
+            "{said}"
+        );
+        assert!(!read(b"x,y,z,power_dbm\n0,0,1,-49.5\n").contains("more than"));
+        assert!(!read(b"x,y,z,power_db\n0,0,1,49.5\n").contains("more than"));
     }
 
     #[test]
