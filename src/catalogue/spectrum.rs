@@ -1,7 +1,7 @@
 //! The permittivity of a material over frequency, as a plot draws it.
 
 use crate::formats::figure::{Plot, Series, Style};
-use crate::formats::words::digits;
+use crate::formats::words::as_typed;
 use crate::material::{Material, Permittivity};
 
 /// Fewest frequencies that are drawn.
@@ -65,7 +65,7 @@ pub fn spectra(material: &Material) -> Vec<Spectrum> {
 
 /// The spectrum of these rows, lowest frequency first.
 fn spectrum(first: &Permittivity, rows: &[&Permittivity]) -> Spectrum {
-    let celsius = first.temperature_k.map(|k| format!(" at {} °C", digits(k - 273.15)));
+    let celsius = first.temperature_k.map(|k| format!(" at {} °C", as_typed(k - 273.15)));
     let name = first.key.clone() + &celsius.unwrap_or_default();
     let ghz = |row: &&Permittivity| row.frequency_hz / 1e9;
     let range_ghz = (rows.first().map_or(0.0, ghz), rows.last().map_or(0.0, ghz));

@@ -123,11 +123,15 @@ impl CloudReading {
         if table.is_empty() {
             return Err(CloudError::Empty);
         }
-        check_columns(&table, &theirs)?;
+        let power = self.power_column(&table)?;
+        let lacking = lacking_places(&table);
+        let Some((power_column, unit)) = power.filter(|_| lacking.is_empty()) else {
+            return Err(missing(&lacking, power.is_none(), &theirs));
+        };
         let places = self.places(&table)?;
         let ranges_m = self.ranges_m(&table)?;
         let chirps = table.column("chirp")?;
-        let (powers, unit) = self.powers(&table)?;
+        let powers = table.full_column(power_column)?.unwrap_or_default();
         let mut points = Vec::with_capacity(places.len());
         for (row, place) in places.into_iter().enumerate() {
             let chirp = chirps.as_ref().map(|chirps| chirps[row]).filter(|chirp| !chirp.is_nan());
@@ -174,7 +178,11 @@ impl CloudReading {
         Ok(None)
     }
 
-    fn powers(&self, table: &PointTable) -> Result<(Vec<f64>, PowerUnit), CloudError> {
+    /// The column of the powers and their unit; none where there is no such column.
+    fn power_column(
+        &self,
+        table: &PointTable,
+    ) -> Result<Option<(&'static str, PowerUnit)>, CloudError> {
         let named = [
             ("power_dbm", PowerUnit::Dbm),
             ("power_w", PowerUnit::Watt),
@@ -184,14 +192,10 @@ impl CloudReading {
         ];
         let names = table.names();
         let mut there = named.into_iter().filter(|(name, _)| names.contains(name));
-        match [there.next(), there.next()] {
-            [Some((first, _)), Some((second, _))] => Err(CloudError::TwoPowers { first, second }),
-            [Some((name, unit)), None] => {
-                let powers = table.full_column(name)?.unwrap_or_default();
-                Ok((powers, self.power.of_column(unit)))
-            }
-            // `check_columns` has found one.
-            _ => Ok((vec![f64::NAN; table.len()], self.power)),
+        let first = there.next();
+        match (first, there.next()) {
+            (Some((first, _)), Some((second, _))) => Err(CloudError::TwoPowers { first, second }),
+            _ => Ok(first.map(|(name, unit)| (name, self.power.of_column(unit)))),
         }
     }
 
@@ -232,36 +236,33 @@ fn check_unit(levels_dbm: &[f64]) -> Result<(), CloudError> {
     if are_dbm { Ok(()) } else { Err(CloudError::Watts { points: levels_dbm.len(), largest }) }
 }
 
-/// Refuses a table without a place or a power, and says all that it lacks.
-fn check_columns(table: &PointTable, theirs: &[String]) -> Result<(), CloudError> {
+/// The columns of places that a table lacks. All three have the unit of the first.
+fn lacking_places(table: &PointTable) -> Vec<String> {
     let names = table.names();
-    let lacks_all = |columns: &[&str]| !columns.iter().any(|column| names.contains(column));
-    let axes = [["x", "x_m", "x_mm"], ["y", "y_m", "y_mm"], ["z", "z_m", "z_mm"]];
-    // All three have the unit of the first.
-    let unit =
-        ["_m", "_mm", ""].into_iter().find(|unit| names.contains(&format!("x{unit}").as_str()));
-    let lacking = axes.iter().filter(|axis| match unit {
-        Some(unit) => !names.contains(&format!("{}{unit}", axis[0]).as_str()),
-        None => true,
-    });
-    let places: Vec<String> =
-        lacking.map(|axis| format!("{}{}", axis[0], unit.unwrap_or("_m"))).collect();
-    let has_no_power = lacks_all(&["power_dbm", "power_w", "power_db", "power_counts", "power"]);
-    if places.is_empty() && !has_no_power {
-        return Ok(());
-    }
-    let is_plural = places.len() + usize::from(has_no_power) > 1;
-    let mut missing = format!("column{} {}", if is_plural { "s" } else { "" }, places.join(", "));
+    let has = |name: &str| names.contains(&name);
+    let unit = ["_m", "_mm", ""].into_iter().find(|unit| has(&format!("x{unit}")));
+    let places = ["x", "y", "z"].map(|axis| format!("{axis}{}", unit.unwrap_or("_m")));
+    places.into_iter().filter(|place| !has(place)).collect()
+}
+
+/// All that a file lacks.
+fn missing(places: &[String], lacks_power: bool, theirs: &[String]) -> CloudError {
+    const POWER: &str = "power_dbm (power_w for watts; power_db for decibels of an unknown level, power_counts for counts)";
     let mut example: Vec<String> = places.iter().map(|place| format!("THEIRS={place}")).collect();
-    if has_no_power {
-        let and = if places.is_empty() { "" } else { " and " };
-        missing += and;
-        missing += "power_dbm (power_w for watts; power_db for decibels of an unknown level, power_counts for counts)";
+    let mut words = vec![places.join(", ")];
+    words.retain(|places| !places.is_empty());
+    if lacks_power {
+        words.push(POWER.to_owned());
         example.push("THEIRS=power_dbm".to_owned());
     }
+    let columns = if example.len() > 1 { "columns" } else { "column" };
     let found: Vec<&str> =
         theirs.iter().map(String::as_str).filter(|name| !name.is_empty()).collect();
-    Err(CloudError::MissingColumns { missing, found: found.join(", "), example: example.join(",") })
+    CloudError::MissingColumns {
+        missing: format!("{columns} {}", words.join(" and ")),
+        found: found.join(", "),
+        example: example.join(","),
+    }
 }
 
 /// A sentence on powers that no radar receives: they are of an unknown level.

@@ -233,9 +233,9 @@ impl NewScene<'_> {
     }
 }
 
-/// A sentence on a radar that stands so far from its points as none of these does.
+/// A sentence on a radar that stands farther from its points than radars of this kind look.
 fn far_away(range_m: f64) -> Option<String> {
-    /// Farther than any radar of this kind looks, m.
+    /// Largest range of such a radar, m.
     const FAR_RADAR_M: f64 = 100.0;
     (range_m > FAR_RADAR_M).then(|| {
         format!(

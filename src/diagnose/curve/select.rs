@@ -108,7 +108,7 @@ impl Selection<'_> {
             terms.par_iter().map(|term| self.trial(round, state, *term)).collect();
         trials.sort_by(|a, b| b.ranked.gain.total_cmp(&a.ranked.gain));
         let least_gain = self.settings.least_gain;
-        trials.par_iter_mut().take(SHORT_LIST).for_each(|trial| self.search_again(trial));
+        trials.par_iter_mut().take(SHORT_LIST).for_each(|trial| self.search_again(state, trial));
         trials.sort_by(|a, b| b.ranked.gain.total_cmp(&a.ranked.gain));
         for trial in trials.iter_mut().take(SHORT_LIST).filter(|t| t.ranked.gain >= least_gain) {
             let with = self.state(trial.model.clone(), trial.fitted.clone());
@@ -134,26 +134,30 @@ impl Selection<'_> {
             let absent: Vec<f64> = term.parameters().iter().map(|known| known.absent).collect();
             model.fit(points, &all, &joined(&state.fitted.at, term, &absent))
         });
-        let [before, after] = [
-            state.model.levels_db(&state.fitted.at, &points.points),
-            model.levels_db(&fitted.at, &points.points),
-        ];
-        let squares: f64 = before.iter().zip(&after).map(|(a, b)| (a - b).powi(2)).sum();
         let ranked = RankedTerm {
             round,
             name: term.name(),
             numbers: term.parameters().len(),
             gain: fitted.log_p - state.fitted.log_p,
             held_out: None,
-            size_db: (squares / before.len().max(1) as f64).sqrt(),
+            size_db: self.size_db(state, &model, &fitted),
             converged: fitted.converged,
             accepted: false,
         };
         Trial { term, ranked, state: None, model, fitted }
     }
 
+    /// Rms change of the levels by a model with one more term, dB.
+    fn size_db(&self, state: &State, model: &Model, fitted: &Fit) -> f64 {
+        let points = &self.points.points;
+        let before = state.model.levels_db(&state.fitted.at, points);
+        let after = model.levels_db(&fitted.at, points);
+        let squares: f64 = before.iter().zip(&after).map(|(a, b)| (a - b).powi(2)).sum();
+        (squares / before.len().max(1) as f64).sqrt()
+    }
+
     /// Searches a term once more from laws beside the one found: the law without the term may lie in another valley.
-    fn search_again(&self, trial: &mut Trial) {
+    fn search_again(&self, state: &State, trial: &mut Trial) {
         let all = vec![true; self.points.points.len()];
         let coordinates = &trial.model.coordinates;
         let (lower, upper, numbers) =
@@ -165,6 +169,7 @@ impl Selection<'_> {
             if found.log_p > trial.fitted.log_p {
                 trial.ranked.gain += found.log_p - trial.fitted.log_p;
                 trial.ranked.converged = found.converged;
+                trial.ranked.size_db = self.size_db(state, &trial.model, &found);
                 trial.fitted = found;
             }
         }
