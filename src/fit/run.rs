@@ -252,7 +252,7 @@ mod tests {
 
     #[test]
     fn the_same_seed_gives_the_same_result_on_any_number_of_threads() {
-        let curve = Twin { rows: 600, ..Twin::default() }.curve(4);
+        let curve = Twin { rows: 150, ..Twin::default() }.curve(4);
         let fit = Fit { starts: 2, seed: 9, ..Fit::default() };
         let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
         let three = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
