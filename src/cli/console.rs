@@ -2,8 +2,9 @@
 
 use std::io::{self, BufWriter, ErrorKind, IsTerminal, Write};
 use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::sync::mpsc::{self, RecvTimeoutError, Sender};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
@@ -53,9 +54,9 @@ impl Console {
             .unwrap_or_else(|_| ProgressStyle::default_spinner());
         bar.set_style(style);
         bar.enable_steady_tick(Duration::from_millis(100));
+        bar.set_message(what);
         let has_lines = !self.quiet && !io::stderr().is_terminal();
-        let last = has_lines.then(|| Mutex::new(Instant::now()));
-        Activity { what, bar, last }
+        Activity { what, bar, lines: has_lines.then(|| Lines::begin(what.to_owned())) }
     }
 
     /// A progress bar over `total` steps; invisible when standard error is no terminal.
@@ -70,32 +71,51 @@ impl Console {
     }
 }
 
-/// Work that says what it does: on a terminal in a line that changes, elsewhere in a line at most every ten seconds.
+/// Work that says what it does: on a terminal in a line that changes, elsewhere in a line every ten seconds.
 pub(super) struct Activity {
     what: &'static str,
     bar: ProgressBar,
-    /// When the last line was written; none on a terminal.
-    last: Option<Mutex<Instant>>,
+    /// None on a terminal.
+    lines: Option<Lines>,
 }
 
 impl Activity {
     /// Says what it does now.
     pub fn now(&self, step: &str) {
-        const BETWEEN: Duration = Duration::from_secs(10);
         let text = format!("{}: {}", self.what, readable(step));
-        if let Some(last) = &self.last {
-            let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
-            if last.elapsed() >= BETWEEN {
-                eprintln!("{text}");
-                *last = Instant::now();
-            }
+        if let Some(lines) = &self.lines {
+            lines.now.lock().unwrap_or_else(PoisonError::into_inner).clone_from(&text);
         }
         self.bar.set_message(text);
     }
 
-    /// Takes the line off a terminal.
+    /// Takes the line off a terminal, and writes no more of them elsewhere.
     pub fn end(self) {
         self.bar.finish_and_clear();
+    }
+}
+
+/// Lines on standard error, one every ten seconds while it lives.
+struct Lines {
+    /// What the next line says.
+    now: Arc<Mutex<String>>,
+    /// The thread that writes ends when this is gone.
+    _alive: Sender<()>,
+}
+
+impl Lines {
+    fn begin(text: String) -> Lines {
+        const BETWEEN: Duration = Duration::from_secs(10);
+        let now = Arc::new(Mutex::new(text));
+        let (alive, ended) = mpsc::channel();
+        let shown = Arc::clone(&now);
+        std::thread::spawn(move || {
+            while ended.recv_timeout(BETWEEN) == Err(RecvTimeoutError::Timeout) {
+                let text = shown.lock().unwrap_or_else(PoisonError::into_inner);
+                eprintln!("{text}");
+            }
+        });
+        Lines { now, _alive: alive }
     }
 }
 

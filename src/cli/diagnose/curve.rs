@@ -29,7 +29,10 @@ pub(super) fn run(path: &Path, args: &Args, console: &Console) -> Result<(), Err
         effects: &effects,
         seed: args.seed,
     };
-    match request.diagnose(&bytes) {
+    let activity = console.activity("diagnosing");
+    let diagnosed = request.diagnose(&bytes);
+    activity.end();
+    match diagnosed {
         Ok((report, notices)) => {
             notices.iter().for_each(|notice| console.notice(notice));
             publish(&report, path, &effects, args, console)

@@ -143,7 +143,10 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let checked = request(args)?.check(db.read()?.as_ref())?;
     args.output.as_deref().map(FigureFormat::of).transpose()?;
     checked.notices.iter().for_each(|notice| console.notice(notice));
-    let FitOutcome { subject, result, fit, stored, refusal } = checked.run(db)?;
+    let activity = console.activity("fitting");
+    let outcome = checked.run(db);
+    activity.end();
+    let FitOutcome { subject, result, fit, stored, refusal } = outcome?;
     let material = subject.found.as_ref().map(|found| &found.material);
     for condition in unmet_conditions(&fit.model, Radar::default().wavelength_m(), material) {
         console.notice(&unmet_sentence(&condition));
