@@ -10,10 +10,8 @@ use super::terms::Term;
 use super::trust::are_trusted;
 
 /// How much better the declared model with terms must be than another model that explains the curve by itself, in ln p less
-/// Schwarz's penalty: odds of twenty to one. Terms that make the declared model the other one are no better.
-const FAR_BETTER: f64 = 3.0;
-/// Terms that only give a law another shape, as other laws have it.
-const SHAPES: [&str; 3] = ["diffuse-lobe", "limb-darkening", "second-lobe"];
+/// Schwarz's penalty: odds of 150 to one. Terms that make the declared model the other one are no better.
+const FAR_BETTER: f64 = 5.0;
 /// Name of the model that was asked for.
 pub(super) const DECLARED: &str = "declared";
 /// Other models to which terms are added, the likeliest first.
@@ -89,7 +87,7 @@ impl Answer {
         if let Some(best) = others.iter().find(|one| one.explains()) {
             let with = Answer::with_terms(selection, declared, terms);
             let least = criterion(selection, &best.state) - FAR_BETTER;
-            let is_effect = with.added.iter().any(|one| !SHAPES.contains(&one.term.name()));
+            let is_effect = with.added.iter().any(|one| !one.term.is_shape());
             let is_far_better = is_effect
                 && with.unexplained.is_empty()
                 && criterion(selection, &with.after) < least;

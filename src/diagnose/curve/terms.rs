@@ -26,6 +26,11 @@ pub trait Term: Sync {
     /// Its signature in a curve, and how it differs from similar terms.
     fn signature(&self) -> &'static str;
 
+    /// Whether it only gives a law another shape, as other laws have it.
+    fn is_shape(&self) -> bool {
+        false
+    }
+
     /// Starts of a search.
     fn starts(&self) -> Vec<Vec<f64>>;
 
@@ -124,6 +129,10 @@ impl Term for DiffuseLobe {
         EffectParameter::new("alpha", "1", [0.0, 50.0], 0.0, 0.1),
     );
 
+    fn is_shape(&self) -> bool {
+        true
+    }
+
     fn starts(&self) -> Vec<Vec<f64>> {
         [0.3, 2.0, 8.0].map(|alpha| vec![alpha]).to_vec()
     }
@@ -151,6 +160,10 @@ impl Term for LimbDarkening {
         EffectParameter::new("k", "1", [-0.9, 5.0], 0.0, 0.05),
     );
 
+    fn is_shape(&self) -> bool {
+        true
+    }
+
     fn starts(&self) -> Vec<Vec<f64>> {
         [-0.3, 0.3].map(|k| vec![k]).to_vec()
     }
@@ -176,6 +189,10 @@ impl Term for SecondLobe {
         EffectParameter::new("f_lambda", "1", [0.0, 1.0], 0.0, 1e-3),
         EffectParameter::new("m", "1", [0.01, 1.5], 0.3, 0.01),
     );
+
+    fn is_shape(&self) -> bool {
+        true
+    }
 
     fn starts(&self) -> Vec<Vec<f64>> {
         pairs(&[1e-3, 1e-2, 0.1], &[0.03, 0.1, 0.3, 0.8])
