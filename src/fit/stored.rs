@@ -186,6 +186,26 @@ mod tests {
     }
 
     #[test]
+    fn numbers_that_cannot_be_told_apart_do_not_widen_the_band() {
+        // Within ten degrees of a narrow lobe's axis the tail is flat: its level and its steepness are one number.
+        let twin =
+            Twin { rows: 2000, theta_sd_deg: 0.3, theta_deg: [0.0, 12.0], ..Twin::default() };
+        let found = Fit::default().run(&mixture(0.1, 3.0, 0.02, 0.004), &twin.curve(3)).unwrap();
+        let stored = found.stored("fit", "scan", "bench");
+        let is_told = |name: &str| {
+            let numbers = stored.numbers();
+            numbers.iter().any(|number| number.name == name && number.is_identified())
+        };
+        assert!(is_told("specular.m") && !is_told("diffuse.alpha"), "{:#?}", found.estimates);
+        for theta_deg in [0.0f64, 2.0, 5.0, 8.0, 11.0] {
+            let band = stored_band(&stored, theta_deg.to_radians()).unwrap();
+            let truth = twin.model.sigma0(theta_deg.to_radians());
+            assert!(band.high / band.low < 1.6, "{theta_deg}: {band:?}");
+            assert!((band.low..band.high).contains(&truth), "{theta_deg}: {band:?}, {truth}");
+        }
+    }
+
+    #[test]
     fn a_report_holds_what_the_fit_found_and_was_given() {
         let curve = Twin { rows: 200, ..Twin::default() }.curve(3);
         let method = Method::Tls { theta_sd_rad: 0.05, level_sd_db: 5.6 };
