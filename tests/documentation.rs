@@ -146,7 +146,11 @@ fn a_laboratory_publishes_its_own_curve_as_the_readme_says() {
 #[test]
 fn the_readme_names_the_test_command_and_files_that_exist() {
     let readme = read("README.md");
-    assert!(blocks(&readme, "sh").iter().any(|block| block.lines().any(|l| l.starts_with("cargo test"))));
+    assert!(
+        blocks(&readme, "sh")
+            .iter()
+            .any(|block| block.lines().any(|l| l.starts_with("cargo test")))
+    );
     for link in readme.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
         assert!(link.starts_with("https://") || root().join(link).exists(), "{link}");
     }
