@@ -13,14 +13,13 @@ import sys
 import tempfile
 import time
 
-from generate import EFFECTS, NOISES, RANGES, SURFACES
+from generate import DUE, EFFECTS, NOISES, RANGES, SURFACES
 
 SAME = [{"diffuse-lobe", "limb-darkening"}, {"second-lobe", "instrument-lobe"}]  # alike in backscatter
 SHAPES = set().union(*SAME)  # another law has these, too
 ALL, CELL, SILENT = 0.01, 0.03, 0.10  # largest shares: names in part A, names in a cell of it, no name in part B
 LEAST = 34  # curves from which on a single name keeps a cell within its share
 LIMIT_S = 120
-DUE = 1  # a name is due where every other law leaves more than this many times the noise
 
 
 def command(matdb, truth, path, folder):
