@@ -4,6 +4,7 @@ use std::io::{self, BufWriter, ErrorKind, IsTerminal, Write};
 use std::path::PathBuf;
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -56,7 +57,9 @@ impl Console {
         bar.enable_steady_tick(Duration::from_millis(100));
         bar.set_message(what);
         let has_lines = !self.quiet && !io::stderr().is_terminal();
-        Activity { what, bar, lines: has_lines.then(|| Lines::begin(what.to_owned())) }
+        let write = |line: &str| eprintln!("{line}");
+        let lines = has_lines.then(|| Lines::begin(what, Duration::from_secs(10), write));
+        Activity { what, bar, lines }
     }
 
     /// A progress bar over `total` steps; invisible when standard error is no terminal.
@@ -84,7 +87,7 @@ impl Activity {
     pub fn now(&self, step: &str) {
         let text = format!("{}: {}", self.what, readable(step));
         if let Some(lines) = &self.lines {
-            lines.now.lock().unwrap_or_else(PoisonError::into_inner).clone_from(&text);
+            lines.next.lock().unwrap_or_else(PoisonError::into_inner).clone_from(&text);
         }
         self.bar.set_message(text);
     }
@@ -95,27 +98,28 @@ impl Activity {
     }
 }
 
-/// Lines on standard error, one every ten seconds while it lives.
+/// Lines that are written while it lives.
 struct Lines {
     /// What the next line says.
-    now: Arc<Mutex<String>>,
+    next: Arc<Mutex<String>>,
     /// The thread that writes ends when this is gone.
     _alive: Sender<()>,
 }
 
 impl Lines {
-    fn begin(text: String) -> Lines {
-        const BETWEEN: Duration = Duration::from_secs(10);
-        let now = Arc::new(Mutex::new(text));
+    /// Writes a line after each `interval`; none where no thread can be had.
+    fn begin(first: &str, interval: Duration, write: impl Fn(&str) + Send + 'static) -> Lines {
+        let next = Arc::new(Mutex::new(first.to_owned()));
         let (alive, ended) = mpsc::channel();
-        let shown = Arc::clone(&now);
-        std::thread::spawn(move || {
-            while ended.recv_timeout(BETWEEN) == Err(RecvTimeoutError::Timeout) {
-                let text = shown.lock().unwrap_or_else(PoisonError::into_inner);
-                eprintln!("{text}");
+        let shown = Arc::clone(&next);
+        let writer = move || {
+            while ended.recv_timeout(interval) == Err(RecvTimeoutError::Timeout) {
+                let line = shown.lock().unwrap_or_else(PoisonError::into_inner).clone();
+                write(&line);
             }
-        });
-        Lines { now, _alive: alive }
+        };
+        drop(thread::Builder::new().spawn(writer));
+        Lines { next, _alive: alive }
     }
 }
 
@@ -166,5 +170,23 @@ fn written(write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), E
         }
         .into()),
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_say_what_is_done_until_it_ends() {
+        let (written, read) = mpsc::channel();
+        let write = move |line: &str| drop(written.send(line.to_owned()));
+        let lines = Lines::begin("fitting", Duration::from_millis(1), write);
+        assert_eq!(read.recv().unwrap(), "fitting");
+        "fitting: again".clone_into(&mut lines.next.lock().unwrap());
+        assert!(read.iter().any(|line| line == "fitting: again"));
+        drop(lines);
+        // The last lines, and then the end of the thread.
+        assert!(read.iter().all(|line| line == "fitting: again"));
     }
 }
