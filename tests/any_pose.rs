@@ -1,8 +1,6 @@
 //! Promise: where the radar and the target stand together does not matter. A radar with its own τ, α
 //! and reflector, moved rigidly with its target, sees what the straight one sees.
 
-mod support;
-
 use glam::DVec3;
 use matdb::brdf::Lambert;
 use matdb::frames::{Global, Model, Point, Pose};
@@ -17,7 +15,7 @@ const ROUNDING: f64 = 1e-9;
 
 fn echoes(radar: &Radar, mesh: &Mesh) -> Vec<Echo> {
     let chirps = Chirps::draw(radar, |_| Err("no file".to_owned())).unwrap();
-    support::echoes(radar, &chirps, mesh, &Lambert { albedo: 0.5 })
+    crate::support::echoes(radar, &chirps, mesh, &Lambert { albedo: 0.5 })
 }
 
 fn facet(echo: &Echo) -> Option<u32> {

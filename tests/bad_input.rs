@@ -1,12 +1,10 @@
 //! Promise: bad input ends with one clear sentence that names the place and the way out, a non-zero
 //! status, and nothing written or changed.
 
-mod support;
-
 use std::fs;
 use std::path::Path;
 
-use support::{entries, matdb, refused, root, scene};
+use crate::support::{entries, matdb, refused, root, scene};
 
 const PLATE: &str = "
 [[mesh]]
@@ -525,11 +523,6 @@ fn a_tracer_that_does_not_take_the_rays() {
         command
     };
     check(&refused(&mut with(&["--tracer", "pinhole"])), &["pinhole", "ray 1", "`bvh`"]);
-    #[cfg(not(feature = "gpu"))]
-    check(
-        &refused(&mut with(&["--tracer", "gpu"])),
-        &["without the tracer `gpu`", "--features gpu"],
-    );
     assert!(!folder.path().join("out").exists());
     with(&["--tracer", "bvh"]).assert().success();
     with(&[]).assert().success();

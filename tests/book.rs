@@ -1,9 +1,7 @@
 //! Promise: every page of docs/ stands in the table of contents, every relative link and anchor of the
 //! documentation resolves, and the pages of the commands and the effects are what the program says.
 //!
-//! `MATDB_WRITE_EFFECTS=1 cargo test --test book` writes the page of the effects.
-
-mod support;
+//! `MATDB_WRITE_EFFECTS=1 cargo test --test promises book::` writes the page of the effects.
 
 #[allow(dead_code)] // Its `main` prints the page.
 #[path = "../examples/commands.rs"]
@@ -13,8 +11,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
+use crate::support::{entries, matdb, root};
 use serde_json::Value;
-use support::{entries, matdb, root};
 
 /// Pages outside the book that link into it.
 const OTHER_PAGES: [&str; 2] = ["README.md", "CONTRIBUTING.md"];
@@ -22,7 +20,7 @@ const OTHER_PAGES: [&str; 2] = ["README.md", "CONTRIBUTING.md"];
 const CONTENTS: &str = "docs/SUMMARY.md";
 
 const EFFECTS: &str = "docs/effects.md";
-const EFFECTS_COMMAND: &str = "MATDB_WRITE_EFFECTS=1 cargo test --test book";
+const EFFECTS_COMMAND: &str = "MATDB_WRITE_EFFECTS=1 cargo test --test promises book::";
 
 /// A page's lines of prose: those outside fenced blocks, with the words in backquotes taken out.
 fn prose(text: &str) -> Vec<String> {

@@ -1,18 +1,16 @@
 //! Promise: every built-in material says where each of its numbers comes from and what is not known,
 //! claims no measured backscatter, renders within its range, and agrees with its sources.
 
-mod support;
-
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::path::Path;
 
 use matdb::brdf::{Brdf, Fresnel, Parameter, Scattering, VIEWING_RAD};
 
+use crate::support::{matdb, root};
 use matdb::catalogue::references;
 use matdb::frames::Direction;
 use matdb::material::{Fit, Material, Permittivity, Source, SourceKind, builtin};
-use support::{matdb, root};
 
 /// What is rendered is asked for at the radar's frequency.
 const RADAR_HZ: f64 = 300e9;

@@ -1,14 +1,12 @@
 //! Promise: `matdb check` finds whatever was changed in a database behind the program's back, fits
 //! again what says how it was fitted, and says nothing of a sound one.
 
-mod support;
-
 use std::fs;
 use std::path::Path;
 
+use crate::support::matdb;
 use rusqlite::Connection;
 use serde_json::Value;
-use support::matdb;
 
 /// Two lobes at 61 angles, without noise.
 fn curve() -> String {
@@ -128,6 +126,6 @@ fn a_curve_above_a_mirror_is_named_by_add_check_and_render() {
 #[test]
 fn a_missing_database_is_said_to_be_missing() {
     let folder = tempfile::tempdir().unwrap();
-    let message = support::refused(matdb(folder.path()).arg("check"));
+    let message = crate::support::refused(matdb(folder.path()).arg("check"));
     assert!(message.contains("there is no database"), "{message}");
 }

@@ -1,7 +1,5 @@
 //! Promise: plates and spheres of known scattering return the power that equation (11) gives by hand.
 
-mod support;
-
 use std::f64::consts::{LN_2, PI};
 
 use glam::DVec3;
@@ -56,7 +54,7 @@ fn echoes(mut mesh: Mesh, turn_rad: f64, surface: &dyn Scattering) -> Vec<Echo> 
     let beam = BeamEntry { edge_growth: 1.0, ..Radar::default().beam };
     let radar = Radar { aperture_m2, system_loss_db, beam, ..Radar::default() };
     let chirps = Chirps::draw(&radar, |_| Err("no file".to_owned())).unwrap();
-    support::echoes(&radar, &chirps, &mesh, surface)
+    crate::support::echoes(&radar, &chirps, &mesh, surface)
 }
 
 #[test]

@@ -2,15 +2,13 @@
 //! the same range and angle, or on a shared edge the other facet at the same range. The pinhole and the
 //! hierarchy agree to the bit, and nothing slips through the edges and corners of a closed mesh.
 
-mod support;
-
+use crate::support::entries;
+use crate::support::meshes::{edges, needles, one_facet, pile, ray, square};
 use glam::{DQuat, DVec3, EulerRot};
 use matdb::frames::{Direction, Global, Point, Ray};
 use matdb::geometry::Mesh;
 use matdb::scene::{Scene, mannequin, solids};
 use matdb::trace::{Bvh, Fan, Hit, Tracer};
-use support::entries;
-use support::meshes::{edges, needles, one_facet, pile, ray, square};
 
 /// Both measure in f64 by different formulas; at 8 m a unit in the last place is 2e-15 m.
 const RANGE: f64 = 1e-12;
@@ -52,7 +50,7 @@ fn judged(mesh: &Mesh, rays: &[Ray<Global>], share: f64) -> Vec<Option<Hit>> {
 }
 
 fn check(name: &str) {
-    let scene = Scene::load(&support::scene(name)).unwrap();
+    let scene = Scene::load(&crate::support::scene(name)).unwrap();
     let hits = judged(&scene.target.mesh, &scene.chirps.rays, RANGE);
     // The front of a calibration sphere is small.
     assert!(hits.len() > 1000 && hits.iter().flatten().count() > 50, "{name}");
@@ -60,7 +58,7 @@ fn check(name: &str) {
 
 #[test]
 fn on_every_scene() {
-    let scenes = entries(&support::root().join("scenes"));
+    let scenes = entries(&crate::support::root().join("scenes"));
     let scenes: Vec<_> = scenes.iter().filter(|name| name.ends_with(".toml")).collect();
     assert!(scenes.len() >= 5);
     scenes.into_iter().for_each(|name| check(name));

@@ -2,16 +2,14 @@
 //! renders the powers of the scene with the hidden effect; it stores all or nothing, and writes over
 //! nobody's scene.
 
-mod support;
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use crate::support::database::contents;
+use crate::support::{entries, matdb, read_cloud, refused, root};
 use matdb::material::FindingVerdict;
 use matdb::scene::SceneFile;
-use support::database::contents;
-use support::{entries, matdb, read_cloud, refused, root};
 
 /// A ball under few chirps with speckle and noise; its mesh stands in a folder of its own.
 const SCENE: &str = r#"

@@ -1,15 +1,13 @@
 //! Promise: `matdb diagnose` leaves a whole report, or says in files and in one sentence that it cannot
 //! tell; its table gives the errors that it states, and no name in a scene becomes part of its page.
 
-mod support;
-
 use std::fs;
 use std::path::Path;
 
+use crate::support::{entries, matdb, read_cloud, refused};
 use matdb::diagnose::curve::terms;
 use matdb::effects::{EffectParameter, library};
 use serde_json::{Value, json};
-use support::{entries, matdb, read_cloud, refused};
 
 /// A sphere and a plate under few chirps with speckle.
 const SCENE: &str = "
@@ -111,11 +109,8 @@ fn speckle_that_neighbours_share_is_no_effect() {
     fs::write(folder.path().join("measured.toml"), shared).unwrap();
     fs::write(folder.path().join("scene.toml"), stated).unwrap();
     matdb(folder.path()).args(["render", "-q", "measured.toml", "-o", "out"]).assert().success();
-    let arguments = ["diagnose", "-q", "out/cloud.ply", "--scene", "scene.toml", "-o", "answer"];
     let effects = ["--effects", "foreign-patch,fov-gain,drift,subsurface"];
-    matdb(folder.path()).args(arguments).args(effects).assert().success();
-    let report = fs::read(folder.path().join("answer/report.json")).unwrap();
-    let report: Value = serde_json::from_slice(&report).unwrap();
+    let report = diagnosed(folder.path(), "out/cloud.ply", "scene.toml", &effects);
     assert_eq!(report["verdict"], "no-missing-effect", "{}", report["effects"]);
     let rows =
         fs::read_to_string(folder.path().join("answer/residuals.csv")).unwrap().lines().count();
@@ -137,10 +132,7 @@ fn what_the_renderer_follows_is_no_effect() {
         let at = folder.path();
         fs::write(at.join("scene.toml"), scene).unwrap();
         matdb(at).args(["render", "-q", "scene.toml", "-o", "out"]).assert().success();
-        let arguments = ["diagnose", "-q", "out/cloud.ply", "--scene", "scene.toml"];
-        let output = ["-o", "answer", "--effects", effects];
-        matdb(at).args(arguments).args(output).assert().success();
-        let report = json(&at.join("answer/report.json"));
+        let report = diagnosed(at, "out/cloud.ply", "scene.toml", &["--effects", effects]);
         assert_eq!(report["verdict"], "no-missing-effect", "{follows}: {}", report["effects"]);
         let is_left_out = |one: &Value| one["name"] == follows && one["reason"] == "declared";
         assert!(report["not_tried"].as_array().unwrap().iter().any(is_left_out), "{follows}");
@@ -163,9 +155,9 @@ fn what_the_renderer_follows_is_no_effect() {
     matdb(at).args(["render", "-q", "answer/after.toml", "-o", "after"]).assert().success();
 }
 
-/// Diagnoses a cloud of the folder and gives the report.
+/// Diagnoses a cloud of the folder without controls, which change no answer, and gives the report.
 fn diagnosed(at: &Path, cloud: &str, scene: &str, flags: &[&str]) -> Value {
-    let arguments = ["diagnose", "-q", cloud, "--scene", scene, "-o", "answer"];
+    let arguments = ["diagnose", "-q", cloud, "--scene", scene, "--no-controls", "-o", "answer"];
     matdb(at).args(arguments).args(flags).assert().success();
     json(&at.join("answer/report.json"))
 }
@@ -347,10 +339,8 @@ fn the_level_of_a_radar_is_no_effect() {
     for (loss_db, level_db) in [(27.5, 15.0), (-2.5, -15.0)] {
         let off = SCENE.replace("[radar]\n", &format!("[radar]\nsystem_loss_db = {loss_db}\n"));
         fs::write(at.join("off.toml"), &off).unwrap();
-        let arguments = ["diagnose", "-q", "out/cloud.ply", "--scene", "off.toml", "-o", "answer"];
         let effects = ["--effects", "subsurface,noise-floor,foreign-patch"];
-        matdb(at).args(arguments).args(effects).assert().success();
-        let report = json(&at.join("answer/report.json"));
+        let report = diagnosed(at, "out/cloud.ply", "off.toml", &effects);
         assert_eq!(report["verdict"], "no-missing-effect", "{}", report["effects"]);
         let found = &report["base"]["level_db"];
         let (value, sd) = (number(&found["value"]), number(&found["sd"]));
@@ -363,9 +353,8 @@ fn the_level_of_a_radar_is_no_effect() {
     // A radar that was calibrated has the level that it states.
     let sure = SCENE.replace("[radar]\n", "[radar]\ncalibrated = true\n");
     fs::write(at.join("sure.toml"), sure).unwrap();
-    let arguments = ["diagnose", "-q", "out/cloud.ply", "--scene", "sure.toml", "-o", "answer"];
-    matdb(at).args(arguments).args(["--effects", "subsurface"]).assert().success();
-    assert!(json(&at.join("answer/report.json"))["base"]["level_db"].is_null());
+    let report = diagnosed(at, "out/cloud.ply", "sure.toml", &["--effects", "subsurface"]);
+    assert!(report["base"]["level_db"].is_null());
 }
 
 #[test]
@@ -676,7 +665,7 @@ fn a_scan_without_times_is_diagnosed_without_what_goes_with_time() {
     let expected = json!({"name": "drift", "reason": "not-asked"});
     assert!(left_out().as_array().unwrap().contains(&expected), "{}", left_out());
     let all = ["diagnose", "out/cloud.ply", "--scene", "untimed.toml", "-o", "report"];
-    matdb(at).args(all).assert().success();
+    matdb(at).args(all).arg("--no-controls").assert().success();
     let untimed = ["drift", "motion"].map(|name| json!({"name": name, "reason": "no-times"}));
     let mut found = left_out().as_array().unwrap().clone();
     found.sort_by_key(|one| one["name"].to_string());
@@ -687,7 +676,7 @@ fn a_scan_without_times_is_diagnosed_without_what_goes_with_time() {
         .unwrap();
     let mut all =
         ["diagnose", "out/cloud.ply", "--scene", "unranged.toml", "-o", "unranged"].to_vec();
-    matdb(at).args(&all).assert().success();
+    matdb(at).args(&all).arg("--no-controls").assert().success();
     let left_out = json(&at.join("unranged/report.json"))["not_tried"].clone();
     for name in ["pose", "motion"] {
         let expected = json!({"name": name, "reason": "no-ranges"});

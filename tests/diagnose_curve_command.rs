@@ -1,15 +1,13 @@
 //! Promise: `matdb diagnose --curve` names what a curve's law lacks, in files and on the terminal.
 
-mod support;
-
 use std::fs;
 use std::path::Path;
 
+use crate::support::{entries, matdb, refused};
 use matdb::brdf::Scattering;
 use matdb::diagnose::curve::{Points, base_law, term};
 use matdb::measure::in_plane::InPlane;
 use serde_json::Value;
-use support::{entries, matdb, refused};
 
 const FILES: [&str; 5] = ["curve.png", "curve.svg", "report.html", "report.json", "residuals.csv"];
 

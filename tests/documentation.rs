@@ -1,14 +1,12 @@
 //! Promise: every command of the README runs as it stands there, and every example file in the docs
 //! is accepted.
 
-mod support;
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use crate::support::{entries, matdb, root};
 use matdb::brdf::Scattering;
-use support::{entries, matdb, root};
 
 fn read(path: &str) -> String {
     fs::read_to_string(root().join(path)).unwrap()

@@ -5,20 +5,18 @@
 //! What the peers themselves say of every built-in material's exports, `tests/peers/check_exports.py` asks them;
 //! docs/exchange.md has the answers. Their files are not kept here.
 
-mod support;
-
 use std::f64::consts::PI;
 use std::fs;
 use std::path::Path;
 
+use crate::support::database::{complete, sample};
+use crate::support::{matdb, refused, root};
 use matdb::brdf::{Brdf, CookTorrance, Distribution, Lambert, Mixture, Scattering, Shadowing};
 use matdb::catalogue::exchange::{Details, Foreign, Format, Subject, export};
 use matdb::material::{Censor, Material, SourceKind, builtin};
 use proptest::prelude::*;
 use proptest::sample::Index;
 use serde_json::Value;
-use support::database::{complete, sample};
-use support::{matdb, refused, root};
 
 const WATER: &str = "# this file is part of refractiveindex.info database
 # copyright and related rights waived via CC0 1.0
@@ -493,13 +491,6 @@ fn the_commands_go_there_and_back() {
         .args(["export", "water", "--as", "sionna", "-o", "x.py"])
         .assert()
         .success();
-    #[cfg(not(feature = "parquet"))]
-    {
-        let mut command = matdb(folder.path());
-        let message =
-            refused(command.args(["export", "scan", "--as", "parquet", "-o", "x.parquet"]));
-        assert!(message.contains("--features parquet"), "{message}");
-    }
 }
 
 #[test]

@@ -1,16 +1,14 @@
 //! Promise: `matdb fit` turns a curve into parameters with intervals and a verdict, stores them as a
 //! revision that scenes render, and gives a sentence instead of a number where the data do not suffice.
 
-mod support;
-
 use std::fs;
 use std::path::Path;
 
+use crate::support::{entries, matdb, refused, scene};
 use matdb::brdf::{Brdf, Scattering};
 use matdb::radar::random::{Key, Purpose};
 use matdb::units::db_from_ratio;
 use serde_json::Value;
-use support::{entries, matdb, refused, scene};
 
 const HEADER: &str = "theta_deg,theta_sd_deg,power_dbm,sigma0_db,range_m,chirp,censored\n";
 /// σ⁰ of 0 dB in this radar, dBm.
@@ -186,7 +184,7 @@ fn data_that_leave_every_number_at_a_bound_are_told_so() {
         assert!(said.contains("bound") || output.status.code() == Some(1), "{method}: {said}");
     }
     fs::write(folder.join("four.csv"), curve(0.0, 60.0, 4)).unwrap();
-    let exact = support::refused(matdb(folder).args(["fit", "four.csv", "--method", "tls"]));
+    let exact = crate::support::refused(matdb(folder).args(["fit", "four.csv", "--method", "tls"]));
     assert!(exact.contains("4 unknowns and their errors"), "{exact}");
 }
 

@@ -1,13 +1,11 @@
 //! Other people's clouds and curves, by the program: from a file with columns of its own to a fitted material.
 
-mod support;
-
 use std::fs;
 use std::io::Cursor;
 use std::path::Path;
 
+use crate::support::matdb;
 use matdb::formats::{PointFormat, PointTable};
-use support::matdb;
 
 /// A scene of a ball that another radar looks at, from its own place; speckle of four looks and an error of range.
 const SCENE: &str = r#"

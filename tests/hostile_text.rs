@@ -1,8 +1,6 @@
 //! Promise: no scene, material or curve file makes the program panic, whatever numbers and words
 //! stand in it; what is accepted renders to finite ranges and angles.
 
-mod support;
-
 use std::path::Path;
 
 use matdb::brdf::{Brdf, Lambert, Scattering};

@@ -2,16 +2,14 @@
 //! wherever it goes. Curves of two forms are converted or refused, a fit through a beam finds the surface's own lobe,
 //! no beam widens a lobe twice, and a law that reflects more than it receives is named.
 
-mod support;
-
 use std::f64::consts::PI;
 use std::fs;
 use std::path::Path;
 
+use crate::support::{matdb, refused};
 use matdb::brdf::{Brdf, Scattering, ThroughBeam};
 use matdb::radar::random::{Key, Purpose};
 use serde_json::Value;
-use support::{matdb, refused};
 
 /// Divergence of the beam of the curves here, rad.
 const BEAM_RAD: f64 = 0.0117;
@@ -440,7 +438,7 @@ fn a_law_that_reflects_more_than_it_receives_is_named_once() {
 fn a_publication_of_an_older_program_is_sound_and_says_that_no_footprint_is_stated() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let site = support::root().join("tests/fixtures/publication-of-schema-0011");
+    let site = crate::support::root().join("tests/fixtures/publication-of-schema-0011");
     let site = site.to_str().unwrap();
     let (text, said) = run(at, &format!("verify {site}"));
     assert!((text + &said).contains("whose schema is an older one"), "{said}");

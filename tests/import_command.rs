@@ -2,17 +2,15 @@
 //! nothing; what differs from one's own stays as it is and is reported; what cannot be trusted is
 //! refused in one sentence.
 
-mod support;
-
 use std::fs;
 use std::path::Path;
 
+use crate::support::database::{changed, contents, sample, sound};
+use crate::support::{entries, list_hashes, matdb, refused};
 use matdb::catalogue::{About, publish};
 use matdb::material::Material;
 use matdb::store::Store;
 use serde_json::Value;
-use support::database::{changed, contents, sample, sound};
-use support::{entries, list_hashes, matdb, refused};
 
 /// Two folders: theirs with a published `site`, and ours with a database in which `paint` differs.
 fn laboratories() -> (tempfile::TempDir, tempfile::TempDir) {

@@ -1,13 +1,11 @@
 //! Promise: what a scene can switch on beyond the paper's single ray does what its law says: speckle,
 //! noise, the range receiver, false alarms, other antennas, second surfaces, a grain.
 
-mod support;
-
 use std::collections::BTreeMap;
 use std::fs;
 
+use crate::support::{matdb, read_cloud};
 use serde_json::Value;
-use support::{matdb, read_cloud};
 
 type Cloud = BTreeMap<String, Vec<f64>>;
 

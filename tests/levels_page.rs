@@ -1,13 +1,11 @@
 //! Promise: `docs/levels.md` has the peak of each built-in material as this program renders it, and a change from 0.1.0 that
 //! follows from its class. No material returns more than was sent.
 
-mod support;
-
 use std::collections::BTreeSet;
 use std::fs;
 
+use crate::support::{entries, matdb, root};
 use serde_json::Value;
-use support::{entries, matdb, root};
 
 /// Of two rounded numbers, dB.
 const ROUNDING_DB: f64 = 0.0051;

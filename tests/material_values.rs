@@ -1,10 +1,8 @@
 //! Promise: a material that says something impossible is refused with one sentence that names the
 //! place and the way out, and what nobody says changes no hash.
 
-mod support;
-
+use crate::support::database::{as_first_stored, complete, fitted, with_effects};
 use matdb::material::{Material, Status, file};
-use support::database::{as_first_stored, complete, fitted, with_effects};
 
 type Spoil = fn(&mut Material);
 

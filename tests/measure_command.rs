@@ -2,14 +2,12 @@
 //! reduced to a curve, fitted, stored, rendered and compared. Clouds that cannot be used give one
 //! sentence and no number.
 
-mod support;
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use crate::support::{entries, matdb, read_cloud, refused};
 use serde_json::Value;
-use support::{entries, matdb, read_cloud, refused};
 
 /// The painted mannequin alone, with speckle, noise and a range error; `paint` is what it is made of.
 const SCENE: &str = "

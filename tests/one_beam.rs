@@ -1,8 +1,6 @@
 //! Promise: spot, aperture, wavefront and the lobe of a mirror are of one Gaussian beam, so that levels at
 //! the focus and away from it have their closed forms, and nothing returns more than was sent.
 
-mod support;
-
 use std::f64::consts::{LN_2, PI};
 
 use glam::{DMat3, DVec3};
@@ -96,7 +94,7 @@ fn returned_by(
         ..Radar::default()
     };
     let chirps = Chirps::draw(&radar, |_| Err("no file".to_owned())).unwrap();
-    let echoes = support::echoes_at(&radar, &chirps, &mesh, law, rays, bounce, observer);
+    let echoes = crate::support::echoes_at(&radar, &chirps, &mesh, law, rays, bounce, observer);
     echoes.first().map_or(0.0, |echo| echo.power_w)
 }
 

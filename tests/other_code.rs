@@ -1,13 +1,11 @@
 //! Promise: the diagnosis is right on scans that other code made: Mitsuba's rays and BSDFs, with speckle, noise and level by
 //! numpy (`tests/fixtures/mitsuba`). The whole set takes hours: `.ci/long mitsuba`.
 
-mod support;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::support::matdb;
 use serde_json::Value;
-use support::matdb;
 
 fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/mitsuba")

@@ -2,12 +2,10 @@
 //! stated, never silently: in frequency and in angle, by `render`, `show`, `plot`, `compare`, `diagnose`
 //! and `near`.
 
-mod support;
-
 use std::fs;
 
+use crate::support::{matdb, scene};
 use serde_json::Value;
-use support::{matdb, scene};
 
 const PLATE: &str = "
 seed = 7
@@ -61,7 +59,8 @@ fn detections_outside_the_angles_are_counted_and_the_farthest_is_stated() {
         (&0.into(), &0.0.into())
     );
     let folder = tempfile::tempdir().unwrap();
-    let narrow = fs::read_to_string(support::root().join("materials/glass/material.toml")).unwrap();
+    let narrow =
+        fs::read_to_string(crate::support::root().join("materials/glass/material.toml")).unwrap();
     let narrow = narrow.replace("theta_deg = [0, 80]", "theta_deg = [0, 0.1]");
     fs::write(folder.path().join("material.toml"), narrow).unwrap();
     fs::write(folder.path().join("scene.toml"), PLATE.replace("ptfe", "glass")).unwrap();
@@ -97,7 +96,8 @@ fn show_and_plot_tell_what_is_claimed_from_what_is_not() {
         fs::read_to_string(folder.path().join("plot.svg")).unwrap().matches("<polyline").count()
     };
     let claimed_to_80 = lines();
-    let glass = fs::read_to_string(support::root().join("materials/glass/material.toml")).unwrap();
+    let glass =
+        fs::read_to_string(crate::support::root().join("materials/glass/material.toml")).unwrap();
     let wide = glass.replace("theta_deg = [0, 80]", "theta_deg = [0, 90]");
     fs::write(folder.path().join("material.toml"), wide).unwrap();
     matdb(folder.path()).args(["add", "-q", "--from", "material.toml"]).assert().success();

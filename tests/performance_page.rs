@@ -1,12 +1,10 @@
 //! Promise: `docs/performance.md` is what its scripts make of the stored results, and they count right.
 //! Nothing is measured here. Without a `python3` there is nothing to ask.
 
-mod support;
-
 use std::fs;
 use std::process::{Command, Output};
 
-use support::root;
+use crate::support::root;
 
 /// What the scripts answer; `None` where there is no Python.
 fn python(arguments: &[&str]) -> Option<Output> {

@@ -2,12 +2,10 @@
 //!
 //! Nothing of the library is used here: the files are parsed and equation (11) is evaluated anew.
 
-mod support;
-
 use std::f64::consts::PI;
 
+use crate::support::{matdb, read_cloud, scene};
 use serde_json::Value;
-use support::{matdb, read_cloud, scene};
 
 /// The cloud keeps power and incidence as 32-bit floats; on the steepest lobe that is 1e-4 dB.
 const POWER_DB: f64 = 1e-3;

@@ -7,17 +7,15 @@
 //! references included), roc-validator 0.13.0 (RO-Crate 1.1, every requirement met), cffconvert 2.0.0
 //! (`--validate`), jsonschema 4.26.0 (schemas by their own schema, every file by them).
 
-mod support;
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::support::database::{bytes, contents, refitted, sample, sound, with_effects};
+use crate::support::json_schema::problems;
+use crate::support::{entries, matdb, refused, root};
 use matdb::store::Store;
 use serde_json::Value;
-use support::database::{bytes, contents, refitted, sample, sound, with_effects};
-use support::json_schema::problems;
-use support::{entries, matdb, refused, root};
 
 const ABOUT: &str = "title = 'Paints <of> \"ours\"'\nversion = '1.0'\ndoi = '10.5281/zenodo.123'\n\
     [[person]]\nfamily = 'Roe'\ngiven = 'Ann'\norcid = '0000-0002-1825-0097'\n";
@@ -27,7 +25,7 @@ fn laboratory() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let mut store = Store::open(folder.path().join("matdb.sqlite")).unwrap();
     store.add([&sample("paint"), &sound("primer")]).unwrap();
-    store.add([&support::database::changed("paint")]).unwrap();
+    store.add([&crate::support::database::changed("paint")]).unwrap();
     fs::write(folder.path().join("about.toml"), ABOUT).unwrap();
     folder
 }
@@ -350,7 +348,7 @@ fn nothing_of_somebody_elses_folder_is_touched() {
     fs::write(at.join("site/changes.json"), "{\"schema_version\":99}").unwrap();
     let said = refused(matdb(at).args(["publish", "site"]));
     assert!(said.contains("newer matdb"), "{said}");
-    assert_eq!(support::entries(at), ["about.toml", "matdb.sqlite", "site"]);
+    assert_eq!(crate::support::entries(at), ["about.toml", "matdb.sqlite", "site"]);
 }
 
 #[cfg(unix)]
@@ -375,7 +373,7 @@ fn what_cannot_be_written_leaves_everything_as_it_was() {
     // Root may write anywhere.
     if fs::write(target.join("probe"), "").is_err() {
         refused(matdb(at).args(["publish", "shelf/site", "-q"]));
-        assert!(support::entries(&target).is_empty());
+        assert!(crate::support::entries(&target).is_empty());
     }
     fs::set_permissions(&target, fs::Permissions::from_mode(0o755)).unwrap();
     fs::write(at.join("file"), "x").unwrap();
@@ -501,13 +499,13 @@ fn resql(site: &Path, sql: &str) {
     let conn = rusqlite::Connection::open(site.join("catalogue.sqlite")).unwrap();
     conn.execute_batch(sql).unwrap();
     drop(conn);
-    support::list_hashes(site);
+    crate::support::list_hashes(site);
 }
 
 /// Changes a file and the list of hashes with it.
 fn relist(site: &Path, path: &str, bytes: &[u8]) {
     fs::write(site.join(path), bytes).unwrap();
-    support::list_hashes(site);
+    crate::support::list_hashes(site);
 }
 
 #[test]
@@ -591,7 +589,7 @@ fn put_values_into_models(site: &Path) {
     }
     drop(statement);
     drop(conn);
-    support::list_hashes(site);
+    crate::support::list_hashes(site);
 }
 
 #[test]

@@ -2,15 +2,13 @@
 //!
 //! Also read by hand with pyarrow 26.0.1, which is no relation of the writer.
 
-mod support;
-
 use std::fs::{self, File};
 
+use crate::support::database::{refitted, sample, with_effects};
+use crate::support::matdb;
 use matdb::store::Store;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::Field;
-use support::database::{refitted, sample, with_effects};
-use support::matdb;
 
 fn text(field: &Field) -> String {
     match field {

@@ -1,17 +1,15 @@
 //! Promise: a published site stands alone, every link of it leads somewhere, whatever a database says
 //! is shown and not run, and the same database gives the same bytes.
 
-mod support;
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::support::database::{complete, fitted, refitted, sample, with_effects};
+use crate::support::matdb;
 use matdb::catalogue::{About, publish};
 use matdb::material::{Material, SourceKind, builtin};
 use matdb::store::Store;
-use support::database::{complete, fitted, refitted, sample, with_effects};
-use support::matdb;
 
 const HOSTILE: &str = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\"'&{{7*7}}{% x %}\u{0}\u{1b}[2J\u{202e}abc\u{2028}";
 

@@ -1,13 +1,11 @@
 //! Promise: `matdb radar` writes files that close the circle: the coefficients it prints give the same
 //! scan when pasted into a scene, and so do the rays and the mirror angles it lists.
 
-mod support;
-
 use std::fs;
 use std::path::Path;
 
+use crate::support::{entries, matdb};
 use serde_json::Value;
-use support::{entries, matdb};
 
 const FILES: [&str; 6] = ["f5.toml", "scan.csv", "scan.png", "scan.svg", "spot.csv", "spot.png"];
 

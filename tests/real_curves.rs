@@ -4,8 +4,6 @@
 //! them; the page says where each is published. Without it the tests say that they are skipped.
 //! A test that fails prints the lines that the page lacks.
 
-mod support;
-
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::fs;
@@ -14,7 +12,7 @@ use std::process::Output;
 
 use serde_json::Value;
 
-use support::matdb;
+use crate::support::matdb;
 
 /// A row of a CSV file by column.
 type Record = BTreeMap<String, String>;

@@ -1,10 +1,8 @@
 //! Promise: the same scene and seed give the same bytes in every file, on any number of threads.
 
-mod support;
-
 use std::path::Path;
 
-use support::{entries, matdb, scene};
+use crate::support::{entries, matdb, scene};
 
 fn render(threads: &str, more: &[&str], scene: &Path) -> Vec<(String, Vec<u8>)> {
     let folder = tempfile::tempdir().unwrap();

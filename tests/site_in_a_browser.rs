@@ -2,18 +2,16 @@
 //! filtered, compared and downloaded from, by mouse and by keyboard alone; it says nothing on the
 //! console and asks nobody else for anything.
 
-mod support;
-
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use crate::support::browser::{Browser, ENTER, SPACE, TAB};
+use crate::support::database::{fitted, refitted, sample};
+use crate::support::server::serve;
 use matdb::catalogue::{About, publish};
 use matdb::material::{Material, SourceKind, builtin};
 use matdb::store::Store;
 use serde_json::json;
-use support::browser::{Browser, ENTER, SPACE, TAB};
-use support::database::{fitted, refitted, sample};
-use support::server::serve;
 
 const COUNT: &str = "return document.getElementById('count').textContent";
 const NAMES: &str =

@@ -1,11 +1,9 @@
 //! Several threads and several programs may make, fill and read one database at once.
 
-mod support;
-
 use std::path::Path;
 
+use crate::support::database::{child, contents, given, is_sound, sample};
 use matdb::store::{Addition, Store};
-use support::database::{child, contents, given, is_sound, sample};
 
 const WRITERS: usize = 4;
 const MATERIALS: usize = 5;
@@ -44,7 +42,7 @@ fn programs_write_at_once() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("materials.sqlite");
     let start = |writer: usize| {
-        child("writing_program", &path)
+        child("store_concurrent::writing_program", &path)
             .env("MATDB_TEST_WRITER", writer.to_string())
             .spawn()
             .unwrap()

@@ -1,8 +1,6 @@
 //! What is not a sound, writable database of ours is refused with one clear sentence that names the
 //! file, and what is not ours is left as it was, byte for byte.
 
-mod support;
-
 use std::ffi::{c_char, c_int};
 use std::fs::{self, Permissions};
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
@@ -10,9 +8,9 @@ use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::support::database::{bytes, changed, child, contents, given, is_sound, sample};
 use matdb::store::{Store, StoreError};
 use rusqlite::{Connection, ffi};
-use support::database::{bytes, changed, child, contents, given, is_sound, sample};
 
 /// A folder with a database that holds one material.
 fn database() -> (tempfile::TempDir, PathBuf) {
@@ -285,7 +283,7 @@ fn a_file_that_may_not_grow_is_left_as_it_was() {
     for blocks in 0.. {
         let now = folder.path().join(format!("{blocks}.sqlite"));
         fs::copy(&path, &now).unwrap();
-        let inner = child("writer_without_room", &now);
+        let inner = child("store_refuses::writer_without_room", &now);
         let output = Command::new("sh")
             .args(["-c", "trap '' XFSZ; ulimit -f $0; exec \"$@\"", &blocks.to_string()])
             .arg(inner.get_program())
@@ -334,7 +332,7 @@ unsafe extern "C" fn limit_pages(
 #[test]
 fn a_full_disk_is_named_and_nothing_is_changed() {
     let (_folder, path) = database();
-    let output = child("crowded_process", &path).output().unwrap();
+    let output = child("store_refuses::crowded_process", &path).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
     assert!(is_sound(&path));
 }

@@ -2,22 +2,20 @@
 //! of that schema lies in `tests/fixtures/`. It opens, holds what it should, and once brought up to
 //! date has the very schema of a fresh file.
 //!
-//! `cargo test --test store_schema make_the_fixture -- --ignored` writes the file of the newest
+//! `cargo test --test promises make_the_fixture -- --ignored` writes the file of the newest
 //! schema; do so once when a schema is added, and never change the file again.
-
-mod support;
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::support::database::{
+    attributed, change, complete, contents, fitted, lit, placed, relative, sample, with_effects,
+};
 use matdb::material::{Activity, Input, Material, Origin};
 use matdb::store::{Addition, Store};
 use rusqlite::Connection;
 use rusqlite::functions::FunctionFlags;
-use support::database::{
-    attributed, change, complete, contents, fitted, lit, placed, relative, sample, with_effects,
-};
 
 const NEWEST: &str = "schema-0014.sqlite";
 
@@ -121,9 +119,12 @@ fn files_of_every_schema_are_read_as_they_are_and_not_changed() {
         fs::set_permissions(&old, permissions).unwrap();
         assert_eq!(contents(&old), held(&file), "{file}");
         assert!(fs::read(&old).unwrap() == before, "{file} was written to");
-        assert_eq!(support::entries(folder.path()), ["old.sqlite"]);
-        support::matdb(folder.path()).args(["list", "--db", "old.sqlite"]).assert().success();
-        support::matdb(folder.path())
+        assert_eq!(crate::support::entries(folder.path()), ["old.sqlite"]);
+        crate::support::matdb(folder.path())
+            .args(["list", "--db", "old.sqlite"])
+            .assert()
+            .success();
+        crate::support::matdb(folder.path())
             .args(["show", "paint", "--db", "old.sqlite"])
             .assert()
             .success();
@@ -167,12 +168,14 @@ fn a_damaged_fit_does_not_close_a_file_of_an_older_schema() {
         let readable = damaged_fits(&path, case);
         let before = fs::read(&path).unwrap();
         let run = |line: &str| {
-            let output = support::matdb(folder.path()).args(line.split(' ')).output().unwrap();
+            let output =
+                crate::support::matdb(folder.path()).args(line.split(' ')).output().unwrap();
             (output.status.success(), String::from_utf8_lossy(&output.stdout).into_owned())
         };
         assert!(run("list").0, "{case}");
         assert!(fs::read(&path).unwrap() == before, "{case}: a reader has written");
-        let message = support::refused(support::matdb(folder.path()).args(["show", "paint"]));
+        let message =
+            crate::support::refused(crate::support::matdb(folder.path()).args(["show", "paint"]));
         assert!(message.contains("is damaged") && message.contains("check --repair"), "{message}");
         // SQLite writes nothing more once it has read a damaged page.
         for command in ["check", "check --repair"].into_iter().take(1 + readable) {
@@ -227,7 +230,8 @@ fn what_others_have_made_in_the_way_of_a_newer_schema_is_named() {
         let before = schema(&path);
         for command in ["list", "add ptfe", "check", "check --repair"] {
             let arguments = command.split(' ');
-            let message = support::refused(support::matdb(folder.path()).args(arguments));
+            let message =
+                crate::support::refused(crate::support::matdb(folder.path()).args(arguments));
             let wanted = format!("cannot be brought up to date: {problem}; {remedy}");
             assert!(message.contains(&wanted), "{command}: {message}");
             assert!(!message.contains("damaged"), "{command}: {message}");
@@ -236,8 +240,8 @@ fn what_others_have_made_in_the_way_of_a_newer_schema_is_named() {
         let conn = Connection::open(&path).unwrap();
         conn.execute_batch(drop_it).unwrap();
         drop(conn);
-        support::matdb(folder.path()).args(["add", "ptfe", "-q"]).assert().success();
-        assert!(support::database::is_sound(&path), "{sql}");
+        crate::support::matdb(folder.path()).args(["add", "ptfe", "-q"]).assert().success();
+        assert!(crate::support::database::is_sound(&path), "{sql}");
     }
 }
 

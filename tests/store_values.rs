@@ -2,19 +2,17 @@
 //! derived from it, to the last bit. Only `fit.report` has the values that a fit once found, as its record. A file from before, which had three copies, loses none: where they agree, two are
 //! removed; where they disagree, all stay until the content hash decides.
 
-mod support;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::support::database::{contents, fitted};
+use crate::support::{matdb, refused};
 use matdb::brdf::Brdf;
 use matdb::catalogue::{Refit, StoreCheck};
 use matdb::material::{Estimate, FitNumber, Material, builtin};
 use matdb::store::{Cell, Repair, Store, StoreError};
 use rusqlite::Connection;
 use rusqlite::types::Value;
-use support::database::{contents, fitted};
-use support::{matdb, refused};
 
 /// Tables that schema 10 had, and that publications have had since.
 const TABLES: [&str; 4] = ["fit", "fit_covariance", "fit_estimate", "fit_parameter"];
@@ -23,7 +21,7 @@ const TABLES: [&str; 4] = ["fit", "fit_covariance", "fit_estimate", "fit_paramet
 fn old_file(change: &str) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("matdb.sqlite");
-    let kept = support::root().join("tests/fixtures/fits-of-schema-0010.sqlite");
+    let kept = crate::support::root().join("tests/fixtures/fits-of-schema-0010.sqlite");
     fs::write(&path, fs::read(kept).unwrap()).unwrap();
     Connection::open(&path).unwrap().execute_batch(change).unwrap();
     (folder, path)

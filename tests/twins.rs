@@ -3,31 +3,29 @@
 
 #[path = "../examples/twins/main.rs"]
 #[allow(dead_code)]
-mod twins;
-
-mod support;
+pub mod made;
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use crate::support::{echoes, entries, matdb};
+use made::base::{Base, Slopes};
+use made::case::{OTHER, Outcome, Plan, Shapes, make};
+use made::noise::Grain;
+use made::other_surface::lossy_film;
+use made::physics::{Class, Effect, means};
+use made::refit::{Point, rms_left_db};
+use made::scan::{Stream, World, draws};
+use made::scenes::Geometry;
+use made::strength::{floor, material, points, size_of, thermal_w};
+use made::surface::reflectance;
 use matdb::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Shadowing};
 use matdb::radar::Radar;
 use matdb::radar::speckle::{mean_offset_db, standard_deviation_db};
 use matdb::scene::Scene;
 use matdb::units::dbm_from_watts;
 use serde_json::Value;
-use support::{echoes, entries, matdb};
-use twins::base::{Base, Slopes};
-use twins::case::{OTHER, Outcome, Plan, Shapes, make};
-use twins::noise::Grain;
-use twins::other_surface::lossy_film;
-use twins::physics::{Class, Effect, means};
-use twins::refit::{Point, rms_left_db};
-use twins::scan::{Stream, World, draws};
-use twins::scenes::Geometry;
-use twins::strength::{floor, material, points, size_of, thermal_w};
-use twins::surface::reflectance;
 
 const CHIRPS: usize = 1500;
 

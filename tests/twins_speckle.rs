@@ -1,27 +1,23 @@
 //! Promise: the speckle of sealed twins is a field on the surface, with the correlation and the contrast that
 //! one Gaussian beam gives it, and their lobes are as wide as that beam shows them.
 
-#[path = "../examples/twins/main.rs"]
-#[allow(dead_code)]
-mod twins;
-
 use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 use std::fs;
 
+use crate::twins::made::base::{Base, Local, Slopes};
+use crate::twins::made::field::Field;
+use crate::twins::made::instrument::Speckle;
+use crate::twins::made::noise::{Grain, observe, shares};
+use crate::twins::made::physics::{Acting, Displacement, Effect, means};
+use crate::twins::made::scan::{Sight, World};
+use crate::twins::made::scatterers::{Scatterers, places};
+use crate::twins::made::target::overlap;
 use glam::{DMat3, DVec3};
 use matdb::scene::Scene;
 use num_complex::Complex;
 use serde_json::Value;
-use twins::base::{Base, Local, Slopes};
-use twins::field::Field;
-use twins::instrument::Speckle;
-use twins::noise::{Grain, observe, shares};
-use twins::physics::{Acting, Displacement, Effect, means};
-use twins::scan::{Sight, World};
-use twins::scatterers::{Scatterers, places};
-use twins::target::overlap;
 
 /// Seeds over which an estimate is averaged: 1/√N of it is its standard error.
 const SEEDS: u64 = 25;

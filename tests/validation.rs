@@ -1,36 +1,28 @@
 //! Promise: docs/validation.md says what the crate computes, tests/validation/rows.md says it number for
 //! number, and every number lies within its tolerance unless the page says that it does not.
 //!
-//! `MATDB_WRITE_VALIDATION=1 cargo test --test validation` writes both.
+//! `MATDB_WRITE_VALIDATION=1 cargo test --test promises validation::` writes both.
 
-mod support;
+mod between_the_parts;
+mod chirp_chain;
+mod echoes_of_sheets;
+mod fixture;
+mod kirchhoff;
+mod microfacet;
+mod other_paths;
+mod page;
+mod passive;
+mod quadrature;
+mod reciprocity_energy;
+mod rough;
+mod smooth;
+mod solids;
+mod speckle;
+mod stage;
+mod sub_rays;
+mod transmitter;
 
-mod validation {
-    pub mod between_the_parts;
-    pub mod chirp_chain;
-    pub mod echoes_of_sheets;
-    pub mod fixture;
-    pub mod kirchhoff;
-    pub mod microfacet;
-    pub mod other_paths;
-    pub mod page;
-    pub mod passive;
-    pub mod quadrature;
-    pub mod reciprocity_energy;
-    pub mod rough;
-    pub mod smooth;
-    pub mod solids;
-    pub mod speckle;
-    pub mod stage;
-    pub mod sub_rays;
-    pub mod transmitter;
-}
-
-use validation::page::{self, Row, Section};
-use validation::{
-    between_the_parts, chirp_chain, kirchhoff, microfacet, other_paths, reciprocity_energy, solids,
-    sub_rays,
-};
+use page::{Row, Section};
 
 const PAGE: &str = "docs/validation.md";
 
@@ -60,7 +52,7 @@ fn the_page_holds_what_the_crate_computes() {
 
 /// A file that is as it is made; written where that is asked for.
 fn compare_or_write(name: &str, made: &str) {
-    let path = support::root().join(name);
+    let path = crate::support::root().join(name);
     if std::env::var_os("MATDB_WRITE_VALIDATION").is_some() {
         return std::fs::write(path, made).unwrap();
     }

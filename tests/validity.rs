@@ -1,14 +1,12 @@
 //! Promise: a rendering says, once for each material and in `scan.json`, where it uses a scattering model or a single
 //! ray outside of what its derivation allows, and nothing where it does not; `show` and `fit` say it of models.
 
-mod support;
-
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
+use crate::support::{matdb, scene};
 use serde_json::{Value, json};
-use support::{matdb, scene};
 
 /// Rough plates, two of them of one material, and a ball.
 const SCENE: &str = r#"

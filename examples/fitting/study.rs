@@ -8,7 +8,7 @@ use matdb::radar::speckle::standard_deviation_db;
 use matdb::units::db_from_ratio;
 use rayon::prelude::*;
 
-use crate::truth::{Case, TRUTH, start, truth};
+use super::truth::{Case, TRUTH, start, truth};
 
 pub const LOOKS: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
 pub const THETA_SD_DEG: [f64; 3] = [0.0, 1.0, 3.0];

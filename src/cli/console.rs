@@ -57,8 +57,8 @@ impl Console {
         bar.enable_steady_tick(Duration::from_millis(100));
         bar.set_message(what);
         let has_lines = !self.quiet && !io::stderr().is_terminal();
-        let write = |line: &str| eprintln!("{line}");
-        let lines = has_lines.then(|| Lines::begin(what, Duration::from_secs(10), write));
+        let lines = has_lines
+            .then(|| Lines::begin(what, Duration::from_secs(10), |line| eprintln!("{line}")));
         Activity { what, bar, lines }
     }
 
@@ -112,13 +112,12 @@ impl Lines {
         let next = Arc::new(Mutex::new(first.to_owned()));
         let (alive, ended) = mpsc::channel();
         let shown = Arc::clone(&next);
-        let writer = move || {
+        drop(thread::Builder::new().spawn(move || {
             while ended.recv_timeout(interval) == Err(RecvTimeoutError::Timeout) {
                 let line = shown.lock().unwrap_or_else(PoisonError::into_inner).clone();
                 write(&line);
             }
-        };
-        drop(thread::Builder::new().spawn(writer));
+        }));
         Lines { next, _alive: alive }
     }
 }
@@ -180,8 +179,9 @@ mod tests {
     #[test]
     fn lines_say_what_is_done_until_it_ends() {
         let (written, read) = mpsc::channel();
-        let write = move |line: &str| drop(written.send(line.to_owned()));
-        let lines = Lines::begin("fitting", Duration::from_millis(1), write);
+        let lines = Lines::begin("fitting", Duration::from_millis(1), move |line| {
+            drop(written.send(line.to_owned()));
+        });
         assert_eq!(read.recv().unwrap(), "fitting");
         "fitting: again".clone_into(&mut lines.next.lock().unwrap());
         assert!(read.iter().any(|line| line == "fitting: again"));

@@ -134,7 +134,12 @@ fn diagnosed_with(
     seed: u64,
 ) -> Report {
     let effects = truth.iter().map(|(effect, value)| (*effect, vec![*value]));
-    diagnosed_of(library, effects.collect(), seed)
+    diagnosed_of(library, effects.collect(), &without_controls(seed))
+}
+
+/// Controls change no answer.
+fn without_controls(seed: u64) -> Diagnosis {
+    Diagnosis { seed, controls: false, ..Diagnosis::default() }
 }
 
 /// A scan of a mesh with one region.
@@ -234,13 +239,13 @@ pub(super) fn searched(
 fn diagnosed_of(
     library: &[&'static dyn Effect],
     effects: Vec<(&'static dyn Effect, Vec<f64>)>,
-    seed: u64,
+    settings: &Diagnosis,
 ) -> Report {
     let bench = Bench::new(target());
     let stage = bench.stage();
     let shots = trace_shots(&stage).unwrap();
     let (receiver, declared) = (receiver(), declared());
-    let observations = observed(&stage, &shots, effects, seed);
+    let observations = observed(&stage, &shots, effects, settings.seed);
     let start = near_law();
     let (shots, observations, laws) = (&shots[..], &observations[..], &[start][..]);
     let subject = Subject {
@@ -256,7 +261,7 @@ fn diagnosed_of(
         pose: &[],
     };
     let started = std::time::Instant::now();
-    let report = Diagnosis { seed, ..Diagnosis::default() }.run(&subject, library).unwrap();
+    let report = settings.run(&subject, library).unwrap();
     let detected = observations.iter().filter(|o| o.power_w.is_some()).count();
     eprintln!("{} shots, {detected} detected, {:?}", shots.len(), started.elapsed());
     report
@@ -300,7 +305,8 @@ fn nothing_is_found_where_nothing_is_missing() {
 #[test]
 fn a_missing_effect_is_named_and_its_number_found() {
     for (effect, value) in [(&BOWL, -2.0), (&DRIFT, 3.0)] {
-        let report = diagnosed(&[(effect, value)], 11);
+        let with_controls = Diagnosis { seed: 11, ..Diagnosis::default() };
+        let report = diagnosed_of(&LIBRARY, vec![(effect, vec![value])], &with_controls);
         assert_eq!(report.verdict, Verdict::Explained, "{report:#?}");
         let names: Vec<&str> = report.effects.iter().map(|e| e.name).collect();
         assert_eq!(names, [effect.name()]);
@@ -344,7 +350,7 @@ fn a_weak_effect_beside_a_strong_one_gets_no_name() {
 #[test]
 fn a_search_that_finds_better_laws_at_each_start_has_failed() {
     for (most_starts, fails) in [(1, true), (4, false)] {
-        let settings = Diagnosis { seed: 3, most_starts, ..Diagnosis::default() };
+        let settings = Diagnosis { most_starts, ..without_controls(3) };
         searched((&BOWL, vec![-4.0]), &settings, &|search, space| {
             // The laws as stored, which nobody has fitted.
             let at = space.start();
@@ -369,7 +375,7 @@ fn a_target_that_has_moved_far_is_found_by_its_ranges() {
     for (known, value) in library[1].parameters().iter().zip(&mut path) {
         *value = way_m.iter().find(|(name, _)| *name == known.name).map_or(0.0, |(_, m)| *m);
     }
-    let report = diagnosed_of(&library, vec![(library[1], path.clone())], 5);
+    let report = diagnosed_of(&library, vec![(library[1], path.clone())], &without_controls(5));
     let names: Vec<&str> = report.effects.iter().map(|e| e.name).collect();
     assert_eq!(names, ["motion"], "{report:#?}");
     let found = &report.effects[0].parameters;
@@ -402,7 +408,7 @@ fn a_target_that_turns_while_it_is_scanned_has_moved() {
     for (known, value) in library[1].parameters().iter().zip(&mut path) {
         *value = truth.iter().find(|(name, _)| *name == known.name).map_or(0.0, |(_, by)| *by);
     }
-    let report = diagnosed_of(&library, vec![(library[1], path)], 5);
+    let report = diagnosed_of(&library, vec![(library[1], path)], &without_controls(5));
     let names: Vec<&str> = report.effects.iter().map(|e| e.name).collect();
     assert_eq!(names, ["motion"], "{report:#?}");
     for (name, by) in truth {
@@ -826,7 +832,7 @@ fn diagnosed_as(parts: &[Part], regions: &[Vec<u16>], library: &[&'static dyn Ef
         alarms: &vec![Alarms::default(); parts.len()],
         pose: &[],
     };
-    Diagnosis { seed: 3, ..Diagnosis::default() }.run(&subject, library).unwrap()
+    without_controls(3).run(&subject, library).unwrap()
 }
 
 #[test]

@@ -198,10 +198,10 @@ mod tests {
         let found = Fit::default().run(&mixture(0.1, 3.0, 0.02, 0.004), &twin.curve(3)).unwrap();
         let stored = found.stored("fit", "scan", "bench");
         let covariance = &stored.report.as_ref().unwrap().covariance;
-        let correlation =
-            |a: usize, b: usize| covariance[a][b] / (covariance[a][a] * covariance[b][b]).sqrt();
         // R, α, S and m.
-        assert!(correlation(0, 2) < -0.95 && correlation(1, 3) > 0.95, "{covariance:?}");
+        let [level, shape] = [[0, 2], [1, 3]]
+            .map(|[a, b]| covariance[a][b] / (covariance[a][a] * covariance[b][b]).sqrt());
+        assert!(level < -0.95 && shape > 0.95, "{covariance:?}");
         let is_told = |name: &str| {
             let numbers = stored.numbers();
             numbers.iter().any(|number| number.name == name && number.is_identified())

@@ -4,7 +4,8 @@
 pub const ROWS: &str = "tests/validation/rows.md";
 
 /// Writes the page.
-pub const COMMAND: &str = "`MATDB_WRITE_VALIDATION=1 cargo test --test validation` writes it";
+pub const COMMAND: &str =
+    "`MATDB_WRITE_VALIDATION=1 cargo test --test promises validation::` writes it";
 
 /// Margins that differ by less are equal: rounding must not choose which row is shown.
 const SAME_MARGIN: f64 = 1e-6;

@@ -1,0 +1,71 @@
+//! All promises of the program, a module each: one program compiles and links far faster than sixty, and what they share is
+//! compiled once. `cargo test --test promises sheets::` runs the promise of `sheets.rs`.
+//!
+//! Apart from it stand `store_all_or_nothing.rs`, which puts hooks on every connection of its process to the database, and
+//! `without_features.rs`.
+
+mod any_pose;
+mod bad_input;
+mod book;
+mod builtin_catalogue;
+mod calibrate_command;
+mod check_command;
+mod closed_forms;
+mod closest_hits;
+mod closing_the_loop;
+mod database;
+mod diagnose_add;
+mod diagnose_command;
+mod diagnose_curve_command;
+mod documentation;
+mod energy;
+mod exchange;
+mod finding;
+mod fit_command;
+mod fitting_page;
+mod floors;
+mod foreign_files;
+#[cfg(feature = "gpu")]
+mod gpu_batch;
+#[cfg(feature = "gpu")]
+mod gpu_tracer;
+mod hostile_files;
+mod hostile_text;
+mod illumination;
+mod import_command;
+mod instrument;
+mod levels_page;
+mod mannequin_asset;
+mod material_values;
+mod measure_command;
+mod nearest;
+mod one_beam;
+mod orthogonal_distance;
+mod other_code;
+mod outside_the_range;
+mod performance_page;
+mod polarisation;
+mod power_from_scan_json;
+mod publish_command;
+#[cfg(feature = "parquet")]
+mod publish_parquet;
+mod published_site;
+mod radar_command;
+mod real_curves;
+mod rendered_effects;
+mod same_bytes;
+mod shared_meshes;
+mod sheets;
+mod site_in_a_browser;
+mod speckle;
+mod store_concurrent;
+mod store_damage;
+mod store_refuses;
+mod store_round_trip;
+mod store_schema;
+mod store_values;
+mod support;
+mod twins;
+mod twins_speckle;
+mod validation;
+mod validity;
