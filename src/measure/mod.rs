@@ -24,6 +24,8 @@ pub mod reduce;
 pub mod register;
 mod settings;
 mod point_rays;
+mod ray_gap;
+mod spots;
 mod start;
 pub mod statistics;
 #[cfg(test)]

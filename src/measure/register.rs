@@ -15,10 +15,12 @@ use super::error::RegistrationError;
 use super::freedom::{Freedom, Untold};
 use super::icp::{Gap, Motion, NormalEquations, bulk_sd_m, rigid};
 use super::point_rays::PointRays;
+use super::ray_gap::RayGap;
 use super::settings::{Metric, Registration, Start};
+use super::spots::SpotRays;
 use super::start;
 use super::uncertainty::uncertainty;
-use super::view::{RayGap, View};
+use super::view::View;
 use crate::frames::{Global, Point, Pose};
 use crate::geometry::Mesh;
 use crate::radar::{Chirps, Radar};
@@ -100,19 +102,21 @@ impl Registration {
         chirps: &Chirps,
         cloud: &Cloud,
     ) -> Result<RegistrationResult, RegistrationError> {
-        let points = cloud.points().len();
-        if points < self.least_points {
-            return Err(RegistrationError::TooFew { points, least: self.least_points });
+        let count = cloud.points().len();
+        if count < self.least_points {
+            return Err(RegistrationError::TooFew { points: count, least: self.least_points });
         }
         let point_rays = PointRays::of(cloud, radar, chirps)?;
-        let view = View::new(mesh, &chirps.rays, cloud, &point_rays.rays);
+        let points: Vec<DVec3> = cloud.points().iter().map(|point| point.point.xyz).collect();
+        let spot_rays = self.of_spots.then(|| SpotRays::new(radar, &point_rays.rays, &points));
+        let view = View::new(mesh, &chirps.rays, cloud, &point_rays.rays, spot_rays.as_ref());
         let along_ray = self.metric == Metric::AlongRay;
         if let Start::Given(given) = &self.start
             && self.keep
         {
             let aligned = Alignment { pose: *given, scans: 0, steps: 0, still: true };
             return self
-                .judge(&view, &aligned)
+                .judge(&view, &aligned, true)
                 .map(|found| RegistrationResult { kept: true, ..found });
         }
         if let Start::Given(given) = &self.start
@@ -130,7 +134,7 @@ impl Registration {
             self.settle(&view, &rough, &mut aligned);
             self.check_near(&view, &rough, &aligned.pose)?;
         }
-        let found = self.judge(&view, &aligned)?;
+        let found = self.judge(&view, &aligned, true)?;
         match self.start {
             Start::Given(given) if self.keep_given && found.converged => Ok(found.or_given(&given)),
             _ => Ok(found),
@@ -144,8 +148,10 @@ impl Registration {
         let mut aligned = Alignment { pose: *given, scans: 0, steps: 0, still: false };
         self.close_along_rays(view, &mut aligned, FEW, &Untold::default());
         aligned.still = true;
-        let kept = self.judge(view, &aligned).ok()?.or_given(given);
-        kept.kept.then_some(kept)
+        // Far from the truth gaps look like errors that neighbours share, with which any pose would agree.
+        let [strict, kept] = [false, true].map(|are_shared| self.judge(view, &aligned, are_shared));
+        let is_kept = strict.ok()?.or_given(given).kept;
+        Some(kept.ok()?.or_given(given)).filter(|kept| is_kept && kept.kept)
     }
 
     /// Closes the gaps along the rays, and takes back what the points do not tell. Gaps that are still wide look like errors that
@@ -208,10 +214,12 @@ impl Registration {
         }
     }
 
+    /// The result at a pose, with errors that neighbours share or without.
     fn judge(
         &self,
         view: &View,
         aligned: &Alignment,
+        are_shared: bool,
     ) -> Result<RegistrationResult, RegistrationError> {
         let inliers = inliers(view, &aligned.pose);
         let points = view.points.len();
@@ -221,7 +229,7 @@ impl Registration {
         let squares_m2: f64 = inliers.iter().map(|gap| gap.range_error_m.powi(2)).sum();
         let rms_m = (squares_m2 / inliers.len() as f64).sqrt();
         let used: Vec<Gap> = inliers.iter().map(|gap| gap.gap).collect();
-        let known = uncertainty(&used, view.pivot, view.length_m, true);
+        let known = uncertainty(&used, view.pivot, view.length_m, are_shared);
         Ok(RegistrationResult {
             pose: aligned.pose,
             covariance: known.covariance,

@@ -49,6 +49,9 @@ pub struct Registration {
     pub keep_given: bool,
     /// Keep the given pose whatever the points say.
     pub keep: bool,
+    /// The echoes are of whole spots: a range is the mean over the beam, and not that along its axis. Only
+    /// [`Metric::AlongRay`] takes it into account.
+    pub of_spots: bool,
 }
 
 impl Default for Registration {
@@ -68,6 +71,7 @@ impl Default for Registration {
             farthest_rad: 0.5,
             keep_given: true,
             keep: false,
+            of_spots: false,
         }
     }
 }

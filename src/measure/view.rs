@@ -3,22 +3,20 @@
 use glam::DVec3;
 
 use super::cloud::Cloud;
-use super::icp::{Gap, median};
-use super::tracer::{Intersection, RaySet, Tracer};
+use super::icp::median;
+use super::ray_gap::RayGap;
+use super::spots::{SpotRays, Spots};
+use super::tracer::{RaySet, Tracer};
 use crate::frames::{Global, Pose, Ray};
 use crate::geometry::Mesh;
-
-/// Surfaces at a flatter angle give no useful range: cosine of 80°.
-const FLATTEST_COS: f64 = 0.173_648;
-/// A beam is taken to be off sideways by this share of its error in range, so that a steep surface
-/// does not outweigh all others.
-const SIDEWAYS_SHARE: f64 = 0.5;
 
 /// Mesh, scan and measurement.
 pub(super) struct View<'a> {
     pub tracer: Tracer<'a>,
     pub chirps: RaySet<'a>,
     pub point_rays: RaySet<'a>,
+    /// The rays over the beams, where echoes are of whole spots.
+    spots: Option<Spots<'a>>,
     pub points: Vec<DVec3>,
     /// Median of the measured points by axis: turns are about it.
     pub pivot: DVec3,
@@ -27,12 +25,13 @@ pub(super) struct View<'a> {
 }
 
 impl<'a> View<'a> {
-    /// `point_rays` are the rays of the cloud's points.
+    /// `point_rays` are the rays of the cloud's points, and `spot_rays` those over their beams.
     pub fn new(
         mesh: &'a Mesh,
         chirps: &'a [Ray<Global>],
         cloud: &Cloud,
         point_rays: &'a [Ray<Global>],
+        spot_rays: Option<&'a SpotRays>,
     ) -> View<'a> {
         let points: Vec<DVec3> = cloud.points().iter().map(|point| point.point.xyz).collect();
         let pivot = median_point(&points);
@@ -41,42 +40,23 @@ impl<'a> View<'a> {
         let length_m = median(points.iter().map(|p| p.distance(pivot))).max(LEAST_M);
         let tracer = Tracer::new(mesh);
         let (chirps, point_rays) = (RaySet::new(mesh, chirps), RaySet::new(mesh, point_rays));
-        View { tracer, chirps, point_rays, points, pivot, length_m }
+        let spots = spot_rays.map(|rays| Spots::new(mesh, rays));
+        View { tracer, chirps, point_rays, spots, points, pivot, length_m }
     }
 
     /// Gaps along the measured rays, one per point; `None` where the ray misses, is too flat, or
     /// the gap is wider than `reach_m`. Sizes and gradients are divided by how steep the surface is.
     pub fn ray_gaps(&self, pose: &Pose<Global, Global>, reach_m: f64) -> Vec<Option<RayGap>> {
+        if let Some(spots) = &self.spots {
+            let axes = self.point_rays.rays();
+            return spots.gaps(&self.tracer, pose, axes, &self.points, reach_m);
+        }
         let seen = self.tracer.scan(pose, &self.point_rays);
         seen.iter()
             .zip(self.point_rays.rays())
             .zip(&self.points)
-            .map(|((seen, ray), point)| RayGap::new((*seen)?, ray, *point, reach_m))
+            .map(|((seen, ray), point)| RayGap::on_axis((*seen)?, ray, *point, reach_m))
             .collect()
-    }
-}
-
-/// A gap along a measured ray.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct RayGap {
-    pub gap: Gap,
-    /// Measured minus modelled range, m.
-    pub range_error_m: f64,
-}
-
-impl RayGap {
-    /// The gap of a measured point on its ray; `None` where the surface is too flat or the gap wider than `reach_m`.
-    fn new(seen: Intersection, ray: &Ray<Global>, point: DVec3, reach_m: f64) -> Option<RayGap> {
-        let Intersection { hit, normal } = seen;
-        let range_error_m = (point - ray.origin.xyz).dot(ray.direction.xyz()) - hit.range_m;
-        if hit.cos_theta < FLATTEST_COS || range_error_m.abs() > reach_m {
-            return None;
-        }
-        let tan2 = 1.0 / (hit.cos_theta * hit.cos_theta) - 1.0;
-        let steep = (1.0 + SIDEWAYS_SHARE * SIDEWAYS_SHARE * tan2).sqrt();
-        let gradient = normal / normal.dot(ray.direction.xyz()) / steep;
-        let gap = Gap { at: hit.point.xyz, gradient, size_m: range_error_m / steep };
-        Some(RayGap { gap, range_error_m })
     }
 }
 

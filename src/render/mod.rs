@@ -59,6 +59,7 @@ pub use scan::{Scan, beat_signals, shade, trace, trace_placed};
 pub use setup::{MOST_SHEETS, Setup};
 pub use sheet::Sheet;
 pub use sheet_energy::SheetGain;
+pub(crate) use spot::spot_rays;
 pub use spot::{Behind, Footprints};
 pub use surface::{Orientation, Surface};
 pub use tones::Beats;

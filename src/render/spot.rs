@@ -15,7 +15,7 @@ use super::edges;
 use super::surface::Orientation;
 use crate::frames::{Global, Ray};
 use crate::radar::scan::PATTERN_RANGE_M;
-use crate::radar::{Beam, GaussianBeam, Section};
+use crate::radar::{Beam, GaussianBeam, Radar, Section};
 use crate::trace::{Hit, ScanGeometry, TraceError};
 
 /// 1/φ: successive multiples of it are spread evenly over 0 to 1.
@@ -174,6 +174,22 @@ pub(super) fn edge_distances_m(
     let ranges_m = hits.chunks(rays_per_chirp).map(|hits| hits.first()?.map(|hit| hit.range_m));
     let shots: Vec<_> = chirps.target_points_m(&radar.frames()).zip(ranges_m).collect();
     edges::distances_m(&shots, radar.spot_fwhm_m(), SPOTS * radar.spot_fwhm_m())
+}
+
+/// So many rays for each of some axes, through the spot that its beam has at a range, m. A ray that cannot be laid out is the
+/// axis again.
+pub(crate) fn spot_rays(
+    radar: &Radar,
+    axes: impl Iterator<Item = (Ray<Global>, f64)>,
+    rays_per_spot: usize,
+) -> Vec<Ray<Global>> {
+    let (beam, samples) = (Beam::new(radar), samples(rays_per_spot));
+    let mut rays = Vec::new();
+    for (number, (axis, range_m)) in axes.enumerate() {
+        let spot = Spot::met(&beam, &axis, Some(range_m), number);
+        rays.extend(samples.iter().map(|&sample| spot.ray(sample).unwrap_or(axis)));
+    }
+    rays
 }
 
 /// The rays through the spot of one chirp.

@@ -66,8 +66,10 @@ impl MeasurementRequest<'_> {
             return Err(Error::usage(problem, way_out));
         }
         let region = self.region.map(|name| region_of_name(name, scene)).transpose()?;
-        let registered = self.registration.run(&target.mesh, radar, chirps, cloud)?;
-        let reduction = Reduction { region, of_spots: sees_spots(scene), ..self.reduction };
+        let of_spots = sees_spots(scene);
+        let registration = Registration { of_spots, ..self.registration };
+        let registered = registration.run(&target.mesh, radar, chirps, cloud)?;
+        let reduction = Reduction { region, of_spots, ..self.reduction };
         let reduced = reduction.run(target, radar, chirps, cloud, &registered)?;
         let record = pose_record(self.cloud_file, self.scene_file, &registered, &reduced);
         let svg = measured_curve_plot(&scene.file.name, &reduced.curve).svg()?.into_bytes();
