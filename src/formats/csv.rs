@@ -181,6 +181,18 @@ impl Table {
         self.columns.iter().any(|known| known == column)
     }
 
+    /// Whether the cell says that there is no number: `nan`.
+    pub fn is_not_a_number(&self, row: usize, column: &str) -> bool {
+        let number = self.cell(row, column).map(|cell| parse(cell.text, cell.has_decimal_commas));
+        number.flatten().is_some_and(f64::is_nan)
+    }
+
+    /// Leaves out the rows that are not to be kept, in order.
+    pub fn keep(&mut self, is_kept: &[bool]) {
+        let mut kept = is_kept.iter();
+        self.rows.retain(|_| *kept.next().unwrap_or(&false));
+    }
+
     /// A finite number that must be there.
     pub fn required_number(&self, row: usize, column: &str) -> Result<f64, FormatError> {
         self.number(row, column)?.ok_or_else(|| {

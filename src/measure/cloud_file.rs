@@ -86,17 +86,10 @@ impl Default for CloudReading {
     }
 }
 
-/// Names of the columns that are read.
-const KNOWN: [&str; 18] = [
-    "x_m",
-    "y_m",
-    "z_m",
-    "x_mm",
-    "y_mm",
-    "z_mm",
-    "x",
-    "y",
-    "z",
+/// Names of the columns of places.
+const PLACES: [&str; 9] = ["x_m", "y_m", "z_m", "x_mm", "y_mm", "z_mm", "x", "y", "z"];
+/// Names of the other columns that are read.
+const VALUES: [&str; 9] = [
     "power_dbm",
     "power_w",
     "power_db",
@@ -120,6 +113,8 @@ impl CloudReading {
         let theirs: Vec<String> = table.names().into_iter().map(str::to_owned).collect();
         table.lower_case();
         table.check_names()?;
+        let all = table.len();
+        let empty = table.pass_over_empty(&PLACES);
         if table.is_empty() {
             return Err(CloudError::Empty);
         }
@@ -148,8 +143,14 @@ impl CloudReading {
         }
         cloud.scale = unit.scale();
         cloud.notices.extend(too_strong(&powers, unit));
-        cloud.notices.extend(table.notices.iter().cloned());
-        cloud.notices.extend(table.passed_over(&[&KNOWN[..], &BESIDE_THE_MEASURED].concat()));
+        if empty > 0 {
+            cloud
+                .notices
+                .push(format!("{empty} of {all} points have no place and are passed over"));
+        }
+        cloud
+            .notices
+            .extend(table.passed_over(&[&PLACES[..], &VALUES, &BESIDE_THE_MEASURED].concat()));
         Ok(cloud)
     }
 

@@ -55,8 +55,6 @@ impl PointFormat {
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointTable {
     cells: Cells,
-    /// What a person should know of the file.
-    pub notices: Vec<String>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -71,15 +69,41 @@ impl PointTable {
     /// # Errors
     /// The place at which the bytes break the format.
     pub fn read(format: PointFormat, bytes: &[u8]) -> Result<PointTable, FormatError> {
-        let mut notices = Vec::new();
         let cells = match format {
             PointFormat::Ply => Cells::Numbers(numbers(ply::read_table(bytes)?)),
             PointFormat::Csv => Cells::Text(csv::Table::parse(bytes, Names::InFirstLine)?),
             PointFormat::Xyz => Cells::Text(text(bytes)?),
-            PointFormat::Pcd => Cells::Numbers(pcd::read(bytes, &mut notices)?),
+            PointFormat::Pcd => Cells::Numbers(pcd::read(bytes)?),
             PointFormat::Las => Cells::Numbers(las::read(bytes)?),
         };
-        Ok(PointTable { cells, notices })
+        Ok(PointTable { cells })
+    }
+
+    /// Leaves out the points that have no place: of which a cell in one of these columns is not a number, as in the empty pixels
+    /// of an organised cloud. Gives how many they are.
+    pub fn pass_over_empty(&mut self, places: &[&str]) -> usize {
+        let points = 0..self.len();
+        let is_kept: Vec<bool> = match &self.cells {
+            Cells::Text(table) => points
+                .map(|row| !places.iter().any(|column| table.is_not_a_number(row, column)))
+                .collect(),
+            Cells::Numbers(Numbers { names, columns }) => {
+                let places =
+                    names.iter().zip(columns).filter(|(name, _)| places.contains(&name.as_str()));
+                let places: Vec<&Vec<f64>> = places.map(|(_, column)| column).collect();
+                points.map(|row| !places.iter().any(|column| column[row].is_nan())).collect()
+            }
+        };
+        match &mut self.cells {
+            Cells::Text(table) => table.keep(&is_kept),
+            Cells::Numbers(numbers) => {
+                for column in &mut numbers.columns {
+                    let mut kept = is_kept.iter();
+                    column.retain(|_| *kept.next().unwrap_or(&false));
+                }
+            }
+        }
+        is_kept.iter().filter(|is_kept| !**is_kept).count()
     }
 
     /// Gives columns the names by which they are asked for.
@@ -215,6 +239,23 @@ mod tests {
 
     fn read(format: PointFormat, bytes: &[u8]) -> PointTable {
         PointTable::read(format, bytes).unwrap()
+    }
+
+    #[test]
+    fn points_without_a_place_are_passed_over() {
+        let ply = b"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float p\nend_header\nnan 1\n2 nan\n";
+        for (format, bytes) in
+            [(PointFormat::Csv, &b"x;p\nNaN;1\n2;nan\n"[..]), (PointFormat::Ply, &ply[..])]
+        {
+            let mut table = read(format, bytes);
+            assert_eq!((table.pass_over_empty(&["x"]), table.len()), (1, 1));
+            assert_eq!(table.column("x"), Ok(Some(vec![2.0])));
+            if format == PointFormat::Csv {
+                assert_eq!(table.place(0), "line 3");
+            }
+        }
+        // An empty cell may be a slip.
+        assert_eq!(read(PointFormat::Csv, b"x,p\n,1\n").pass_over_empty(&["x"]), 0);
     }
 
     #[test]

@@ -55,15 +55,14 @@ impl Entries<'_> {
 }
 
 /// Reads a whole file.
-pub(super) fn read(bytes: &[u8], notices: &mut Vec<String>) -> Result<Numbers, FormatError> {
+pub(super) fn read(bytes: &[u8]) -> Result<Numbers, FormatError> {
     let header = Header::read(bytes)?;
     let body = &bytes[header.start..];
-    let table = match header.data {
-        Data::Ascii => header.ascii(body)?,
-        Data::Binary => header.binary(body)?,
-        Data::Compressed => header.compressed(body)?,
-    };
-    Ok(without_empty(table, notices))
+    match header.data {
+        Data::Ascii => header.ascii(body),
+        Data::Binary => header.binary(body),
+        Data::Compressed => header.compressed(body),
+    }
 }
 
 impl Header {
@@ -280,26 +279,6 @@ fn whole_number((line, words): Entry) -> Result<usize, FormatError> {
     }
 }
 
-/// The points that have a place.
-fn without_empty(mut table: Numbers, notices: &mut Vec<String>) -> Numbers {
-    let places: Vec<usize> = ["x", "y", "z"]
-        .iter()
-        .filter_map(|axis| table.names.iter().position(|name| name == axis))
-        .collect();
-    let points = table.columns.first().map_or(0, Vec::len);
-    let is_kept: Vec<bool> =
-        (0..points).map(|row| places.iter().all(|at| !table.columns[*at][row].is_nan())).collect();
-    let empty = is_kept.iter().filter(|kept| !**kept).count();
-    if empty > 0 {
-        notices.push(format!("{empty} of {points} points have no place and are passed over"));
-        for column in &mut table.columns {
-            let mut kept = is_kept.iter();
-            column.retain(|_| *kept.next().unwrap_or(&false));
-        }
-    }
-    table
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -309,7 +288,7 @@ mod tests {
                         VIEWPOINT 0 0 0 1 0 0 0\nPOINTS 2\nDATA ";
 
     fn read_all(bytes: &[u8]) -> Result<Numbers, String> {
-        read(bytes, &mut Vec::new()).map_err(|error| error.to_string())
+        read(bytes).map_err(|error| error.to_string())
     }
 
     fn ascii(rows: &str) -> Result<Numbers, String> {
@@ -358,15 +337,6 @@ mod tests {
         compressed.extend((fields.len() as u32).to_le_bytes());
         compressed.extend(block);
         assert_eq!(read_all(&compressed), Ok(expected()));
-    }
-
-    #[test]
-    fn points_without_a_place_are_passed_over() {
-        let mut notices = Vec::new();
-        let text = format!("{HEAD}ascii\nnan nan nan 0 0 1 9 9\n0.25 1.5 3 0 0 65535 9 9\n");
-        let table = read(text.as_bytes(), &mut notices).unwrap();
-        assert_eq!(table.columns[3], [65535.0]);
-        assert!(notices[0].contains("1 of 2 points"), "{notices:?}");
     }
 
     #[test]
