@@ -1,11 +1,11 @@
 //! All promises of the program, a module each: one program compiles and links far faster than sixty, and what they share is
 //! compiled once. `cargo test --test promises sheets::` runs the promise of `sheets.rs`.
 //!
-//! Apart from it stand `store_all_or_nothing.rs`, which puts hooks on every connection of its process to the database, and
-//! `without_features.rs`.
+//! Apart from it stands `store_all_or_nothing.rs`, which puts hooks on every connection of its process to the database.
 
 mod any_pose;
 mod bad_input;
+mod bare_program;
 mod book;
 mod builtin_catalogue;
 mod calibrate_command;

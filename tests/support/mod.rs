@@ -1,5 +1,5 @@
 //! What tests share.
-#![allow(dead_code)] // Each of the three test programs uses some of it.
+#![allow(dead_code)] // Each of the two test programs uses some of it.
 
 pub mod browser;
 pub mod database;
