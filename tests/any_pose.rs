@@ -1,6 +1,7 @@
 //! Promise: where the radar and the target stand together does not matter. A radar with its own τ, α
 //! and reflector, moved rigidly with its target, sees what the straight one sees.
 
+use crate::support;
 use glam::DVec3;
 use matdb::brdf::Lambert;
 use matdb::frames::{Global, Model, Point, Pose};
@@ -15,7 +16,7 @@ const ROUNDING: f64 = 1e-9;
 
 fn echoes(radar: &Radar, mesh: &Mesh) -> Vec<Echo> {
     let chirps = Chirps::draw(radar, |_| Err("no file".to_owned())).unwrap();
-    crate::support::echoes(radar, &chirps, mesh, &Lambert { albedo: 0.5 })
+    support::echoes(radar, &chirps, mesh, &Lambert { albedo: 0.5 })
 }
 
 fn facet(echo: &Echo) -> Option<u32> {

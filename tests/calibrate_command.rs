@@ -6,7 +6,7 @@ use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
-use crate::support::{matdb, refused};
+use crate::support::{self, matdb, refused};
 use matdb::brdf::Fresnel;
 use matdb::radar::{Chirps, Radar};
 use serde_json::Value;
@@ -158,7 +158,7 @@ fn a_corner_gives_loss_and_spot_though_no_rendering_shows_it() {
     let at = folder.path();
     let cloud = corner_cloud(&Radar::default(), [0.003, 1.098, 0.15]);
     fs::write(at.join("cloud.csv"), cloud).unwrap();
-    let text = fs::read_to_string(crate::support::scene("calibration-trihedral.toml")).unwrap();
+    let text = fs::read_to_string(support::scene("calibration-trihedral.toml")).unwrap();
     fs::write(at.join("corner.toml"), text.replace("1.1, 0.0]", "1.1, 0.15]")).unwrap();
     let found = calibrated(at, "cloud.csv", "corner.toml");
     // A corner with legs of 12 cm is larger than the beam; the scan of the paper sees it with some 15 chirps.
@@ -190,7 +190,7 @@ fn what_does_not_calibrate_is_refused() {
     // A diffuse reference in place of the mirror, which a radar sees alike everywhere.
     write("paper.toml", &scene(&raster(60, 0.4), PLATE).replace("\"steel\"", "\"spectralon\""));
     matdb(at).args(["render", "-q", "paper.toml", "-o", "paper"]).assert().success();
-    let mannequin = crate::support::scene("mannequin.toml").display().to_string();
+    let mannequin = support::scene("mannequin.toml").display().to_string();
     let good = "out/cloud.ply";
     for (cloud, scene, parts) in [
         ("empty.csv", "scene.toml", &["empty.csv", "no points"][..]),

@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::matdb;
+use crate::support::{self, matdb};
 use rusqlite::Connection;
 use serde_json::Value;
 
@@ -126,6 +126,6 @@ fn a_curve_above_a_mirror_is_named_by_add_check_and_render() {
 #[test]
 fn a_missing_database_is_said_to_be_missing() {
     let folder = tempfile::tempdir().unwrap();
-    let message = crate::support::refused(matdb(folder.path()).arg("check"));
+    let message = support::refused(matdb(folder.path()).arg("check"));
     assert!(message.contains("there is no database"), "{message}");
 }

@@ -2,6 +2,7 @@
 
 use std::f64::consts::{LN_2, PI};
 
+use crate::support;
 use glam::DVec3;
 use matdb::brdf::{CookTorrance, Distribution, Lambert, Scattering, Shadowing};
 use matdb::geometry::Mesh;
@@ -54,7 +55,7 @@ fn echoes(mut mesh: Mesh, turn_rad: f64, surface: &dyn Scattering) -> Vec<Echo> 
     let beam = BeamEntry { edge_growth: 1.0, ..Radar::default().beam };
     let radar = Radar { aperture_m2, system_loss_db, beam, ..Radar::default() };
     let chirps = Chirps::draw(&radar, |_| Err("no file".to_owned())).unwrap();
-    crate::support::echoes(&radar, &chirps, &mesh, surface)
+    support::echoes(&radar, &chirps, &mesh, surface)
 }
 
 #[test]

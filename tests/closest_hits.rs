@@ -2,8 +2,8 @@
 //! the same range and angle, or on a shared edge the other facet at the same range. The pinhole and the
 //! hierarchy agree to the bit, and nothing slips through the edges and corners of a closed mesh.
 
-use crate::support::entries;
 use crate::support::meshes::{edges, needles, one_facet, pile, ray, square};
+use crate::support::{self, entries};
 use glam::{DQuat, DVec3, EulerRot};
 use matdb::frames::{Direction, Global, Point, Ray};
 use matdb::geometry::Mesh;
@@ -50,7 +50,7 @@ fn judged(mesh: &Mesh, rays: &[Ray<Global>], share: f64) -> Vec<Option<Hit>> {
 }
 
 fn check(name: &str) {
-    let scene = Scene::load(&crate::support::scene(name)).unwrap();
+    let scene = Scene::load(&support::scene(name)).unwrap();
     let hits = judged(&scene.target.mesh, &scene.chirps.rays, RANGE);
     // The front of a calibration sphere is small.
     assert!(hits.len() > 1000 && hits.iter().flatten().count() > 50, "{name}");
@@ -58,7 +58,7 @@ fn check(name: &str) {
 
 #[test]
 fn on_every_scene() {
-    let scenes = entries(&crate::support::root().join("scenes"));
+    let scenes = entries(&support::root().join("scenes"));
     let scenes: Vec<_> = scenes.iter().filter(|name| name.ends_with(".toml")).collect();
     assert!(scenes.len() >= 5);
     scenes.into_iter().for_each(|name| check(name));

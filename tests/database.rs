@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::{entries, matdb, refused, refused_with_lines, root, scene};
+use crate::support::{self, entries, matdb, refused, refused_with_lines, root, scene};
 use serde_json::Value;
 
 fn json(folder: &Path, arguments: &[&str]) -> Value {
@@ -78,8 +78,7 @@ fn several_materials_are_added_together_or_not_at_all() {
     let own = tempfile::tempdir().unwrap();
     variant(own.path(), "ptfe", "m = 0.05", "m = 0.07");
     variant(own.path(), "glass", "m = 0.02", "m = 9");
-    let refused =
-        crate::support::refused(matdb(folder.path()).args(["add", "--from"]).arg(own.path()));
+    let refused = support::refused(matdb(folder.path()).args(["add", "--from"]).arg(own.path()));
     assert!(refused.contains("glass") && refused.contains("specular.m = 9"), "{refused}");
     assert_eq!(json(folder.path(), &["show", "ptfe"])["revision"], 1);
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-use crate::support::{matdb, refused, root};
+use crate::support::{self, matdb, refused, root};
 use matdb::brdf::Scattering;
 use matdb::catalogue::{Diff, references};
 use matdb::material::{Material, Observation, SourceKind, builtin};
@@ -37,7 +37,7 @@ fn slugs(list: &Value) -> Vec<&str> {
 fn variant(folder: &Path, slug: &str, from: &str, to: &str) {
     let own = folder.join(slug);
     fs::create_dir_all(&own).unwrap();
-    for file in crate::support::entries(&root().join("materials").join(slug)) {
+    for file in support::entries(&root().join("materials").join(slug)) {
         fs::copy(root().join("materials").join(slug).join(&file), own.join(&file)).unwrap();
     }
     let text = fs::read_to_string(own.join("material.toml")).unwrap();
@@ -254,11 +254,7 @@ fn words_are_searched_in_what_is_built_in_and_in_the_database_and_labelled() {
     };
     let built_in = ("ptfe".to_owned(), "built-in".to_owned());
     assert!(of(&json(folder, &["search", "ptf"])).contains(&built_in));
-    assert_eq!(
-        crate::support::entries(folder),
-        Vec::<String>::new(),
-        "searching makes no database"
-    );
+    assert_eq!(support::entries(folder), Vec::<String>::new(), "searching makes no database");
     matdb(folder).args(["add", "ptfe"]).assert().success();
     let found = of(&json(folder, &["search", "ptf"]));
     assert_eq!(found[0], ("ptfe".to_owned(), "database".to_owned()));
@@ -328,7 +324,7 @@ fn a_withdrawn_material_stays_with_its_reason_and_is_found_by_it() {
         command
     };
     assert!(refused(&mut withdraw(&[])).contains("`ptfe` is not in"));
-    assert!(crate::support::entries(folder).is_empty());
+    assert!(support::entries(folder).is_empty());
     matdb(folder).args(["add", "ptfe", "hdpe"]).assert().success();
     assert!(refused(&mut withdraw(&["--superseded-by", "hdp"])).contains("did you mean `hdpe`?"));
     withdraw(&[]).assert().success();

@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::{entries, matdb, refused, scene};
+use crate::support::{self, entries, matdb, refused, scene};
 use matdb::brdf::{Brdf, Scattering};
 use matdb::radar::random::{Key, Purpose};
 use matdb::units::db_from_ratio;
@@ -184,7 +184,7 @@ fn data_that_leave_every_number_at_a_bound_are_told_so() {
         assert!(said.contains("bound") || output.status.code() == Some(1), "{method}: {said}");
     }
     fs::write(folder.join("four.csv"), curve(0.0, 60.0, 4)).unwrap();
-    let exact = crate::support::refused(matdb(folder).args(["fit", "four.csv", "--method", "tls"]));
+    let exact = support::refused(matdb(folder).args(["fit", "four.csv", "--method", "tls"]));
     assert!(exact.contains("4 unknowns and their errors"), "{exact}");
 }
 

@@ -5,6 +5,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::support::{entries, root};
+
 fn source() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
 }
@@ -450,4 +452,17 @@ fn benches_and_examples_call_the_library() {
     }
     starters.sort();
     assert_eq!(starters, STARTERS);
+}
+
+#[test]
+fn every_file_of_tests_is_run() {
+    let listed = std::fs::read_to_string(root().join("tests/promises.rs")).unwrap();
+    for file in entries(&root().join("tests")) {
+        let Some(name) = file.strip_suffix(".rs") else { continue };
+        let is_program = ["promises", "store_all_or_nothing"].contains(&name);
+        assert!(
+            is_program || listed.contains(&format!("\nmod {name};\n")),
+            "{file} is not in promises.rs"
+        );
+    }
 }

@@ -4,6 +4,7 @@
 //!
 //! A driver in software will do. Where there is none the tests say so and pass, unless `MATDB_NEED_GPU` is set.
 
+use crate::support;
 use glam::DVec3;
 use matdb::brdf::{Brdf, CookTorrance, Distribution, Shadowing};
 use matdb::frames::{Global, Pose};
@@ -56,7 +57,7 @@ fn builtin(name: &str) -> Brdf {
 impl Bench {
     /// A scene's target, in a scan of so many chirps.
     fn of(scene: &str, count: usize) -> Bench {
-        let scene = Scene::load(&crate::support::scene(scene)).unwrap();
+        let scene = Scene::load(&support::scene(scene)).unwrap();
         let scan = Pattern::Elliptical(Elliptical { chirps: count, ..Default::default() });
         let radar = Radar { scan, ..Radar::default() };
         let laws = scene.target.regions.iter().map(|region| builtin(&region.material)).collect();

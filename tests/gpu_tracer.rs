@@ -7,8 +7,8 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::entries;
 use crate::support::meshes::{edges, mesh, needles, one_facet, pile, ray, square};
+use crate::support::{self, entries};
 use glam::DVec3;
 use matdb::frames::{Direction, Global, Ray};
 use matdb::geometry::Mesh;
@@ -73,11 +73,11 @@ fn is_on_edge(mesh: &Mesh, hit: &Hit) -> bool {
 #[test]
 fn on_every_scene() {
     let Some(gpu) = adapter(u64::MAX) else { return };
-    let scenes = entries(&crate::support::root().join("scenes"));
+    let scenes = entries(&support::root().join("scenes"));
     let scenes: Vec<_> = scenes.iter().filter(|name| name.ends_with(".toml")).collect();
     assert!(scenes.len() >= 5);
     for name in scenes {
-        let scene = Scene::load(&crate::support::scene(name)).unwrap();
+        let scene = Scene::load(&support::scene(name)).unwrap();
         let mesh = &scene.target.mesh;
         let (hits, open) = traced_each(&gpu, mesh, &scene.chirps.rays);
         // The corner is small in the field of view.
@@ -220,7 +220,7 @@ fn another_mesh_than_the_one_that_is_held_is_refused() {
 /// Renders a scene in a folder; what it writes, and what it has to note.
 fn render(scene: &Path, tracer: &[&str], drivers: Option<&str>) -> (Vec<Vec<u8>>, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
-    let mut command = crate::support::matdb(folder.path());
+    let mut command = support::matdb(folder.path());
     if let Some(drivers) = drivers {
         command.envs([("VK_ICD_FILENAMES", drivers), ("VK_DRIVER_FILES", drivers)]);
     }
@@ -238,13 +238,12 @@ fn the_program_says_on_what_it_traces_and_writes_the_same_bytes() {
     let Some(gpu) = adapter(u64::MAX) else { return };
     // With several rays in every spot.
     let scan = "[radar.scan]\npattern = \"elliptical\"\nchirps = 1201\n[spot]\nrays = 7\n[[mesh]]";
-    let text = fs::read_to_string(crate::support::scene("human.toml")).unwrap();
+    let text = fs::read_to_string(support::scene("human.toml")).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let spots = folder.path().join("spots.toml");
     fs::write(&spots, text.replacen("[[mesh]]", scan, 1)).unwrap();
-    std::os::unix::fs::symlink(crate::support::scene("meshes"), folder.path().join("meshes"))
-        .unwrap();
-    for scene in [crate::support::scene("mannequin.toml"), spots] {
+    std::os::unix::fs::symlink(support::scene("meshes"), folder.path().join("meshes")).unwrap();
+    for scene in [support::scene("mannequin.toml"), spots] {
         let (files, notes) = render(&scene, &["--tracer", "gpu"], None);
         assert_eq!(notes[0], format!("note: tracing on {}", gpu.adapter()));
         let (expected, others) = render(&scene, &[], None);
@@ -254,7 +253,7 @@ fn the_program_says_on_what_it_traces_and_writes_the_same_bytes() {
 
 #[test]
 fn without_a_driver_the_program_goes_on_without() {
-    let scene = crate::support::scene("mannequin.toml");
+    let scene = support::scene("mannequin.toml");
     let (files, notes) = render(&scene, &["--tracer", "gpu"], Some("/nonexistent"));
     let note = &notes[0];
     assert!(

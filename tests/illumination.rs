@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use std::fs;
 use std::path::Path;
 
-use crate::support::{matdb, refused};
+use crate::support::{self, matdb, refused};
 use matdb::brdf::{Brdf, Scattering, ThroughBeam};
 use matdb::radar::random::{Key, Purpose};
 use serde_json::Value;
@@ -438,7 +438,7 @@ fn a_law_that_reflects_more_than_it_receives_is_named_once() {
 fn a_publication_of_an_older_program_is_sound_and_says_that_no_footprint_is_stated() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let site = crate::support::root().join("tests/fixtures/publication-of-schema-0011");
+    let site = support::root().join("tests/fixtures/publication-of-schema-0011");
     let site = site.to_str().unwrap();
     let (text, said) = run(at, &format!("verify {site}"));
     assert!((text + &said).contains("whose schema is an older one"), "{said}");

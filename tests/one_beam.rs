@@ -3,6 +3,7 @@
 
 use std::f64::consts::{LN_2, PI};
 
+use crate::support;
 use glam::{DMat3, DVec3};
 use matdb::brdf::{
     BlinnPhong, Brdf, CookTorrance, Correlation, Directive, Distribution, Fresnel, Kirchhoff,
@@ -94,7 +95,7 @@ fn returned_by(
         ..Radar::default()
     };
     let chirps = Chirps::draw(&radar, |_| Err("no file".to_owned())).unwrap();
-    let echoes = crate::support::echoes_at(&radar, &chirps, &mesh, law, rays, bounce, observer);
+    let echoes = support::echoes_at(&radar, &chirps, &mesh, law, rays, bounce, observer);
     echoes.first().map_or(0.0, |echo| echo.power_w)
 }
 

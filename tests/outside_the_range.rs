@@ -4,7 +4,7 @@
 
 use std::fs;
 
-use crate::support::{matdb, scene};
+use crate::support::{self, matdb, scene};
 use serde_json::Value;
 
 const PLATE: &str = "
@@ -59,8 +59,7 @@ fn detections_outside_the_angles_are_counted_and_the_farthest_is_stated() {
         (&0.into(), &0.0.into())
     );
     let folder = tempfile::tempdir().unwrap();
-    let narrow =
-        fs::read_to_string(crate::support::root().join("materials/glass/material.toml")).unwrap();
+    let narrow = fs::read_to_string(support::root().join("materials/glass/material.toml")).unwrap();
     let narrow = narrow.replace("theta_deg = [0, 80]", "theta_deg = [0, 0.1]");
     fs::write(folder.path().join("material.toml"), narrow).unwrap();
     fs::write(folder.path().join("scene.toml"), PLATE.replace("ptfe", "glass")).unwrap();
@@ -96,8 +95,7 @@ fn show_and_plot_tell_what_is_claimed_from_what_is_not() {
         fs::read_to_string(folder.path().join("plot.svg")).unwrap().matches("<polyline").count()
     };
     let claimed_to_80 = lines();
-    let glass =
-        fs::read_to_string(crate::support::root().join("materials/glass/material.toml")).unwrap();
+    let glass = fs::read_to_string(support::root().join("materials/glass/material.toml")).unwrap();
     let wide = glass.replace("theta_deg = [0, 80]", "theta_deg = [0, 90]");
     fs::write(folder.path().join("material.toml"), wide).unwrap();
     matdb(folder.path()).args(["add", "-q", "--from", "material.toml"]).assert().success();

@@ -1,6 +1,7 @@
 //! Promise: a specular path keeps the polarisation that its facets give it, what is depolarised adds across it, and
 //! without a word on polarisation nothing changes.
 
+use crate::support;
 use glam::DVec3;
 use matdb::brdf::{KirchhoffGo, Lambert, Scattering};
 use matdb::formats::ply;
@@ -120,7 +121,7 @@ fn the_cross_polar_cloud_is_written_when_asked_for_with_the_depolarised_share() 
     let path = folder.path().join("scene.toml");
     let render = |text: &str, out: &str| {
         std::fs::write(&path, text).unwrap();
-        crate::support::matdb(folder.path()).args(["render", "scene.toml", "-o", out]).assert()
+        support::matdb(folder.path()).args(["render", "scene.toml", "-o", out]).assert()
     };
     render(&scene("", ""), "co").success();
     assert!(!folder.path().join("co/cross-cloud.ply").exists());
@@ -160,9 +161,8 @@ fn what_is_no_polarisation_is_refused_by_name() {
         ("", "depolarised_share = nan", "depolarised_share = NaN"),
     ] {
         std::fs::write(&path, scene(radar, region)).unwrap();
-        let refused = crate::support::matdb(folder.path())
-            .args(["render", "scene.toml", "-o", "out"])
-            .assert();
+        let refused =
+            support::matdb(folder.path()).args(["render", "scene.toml", "-o", "out"]).assert();
         let output = refused.failure().get_output().clone();
         let message = String::from_utf8(output.stderr).unwrap();
         assert!(message.contains(expected), "{radar}{region}: {message}");
@@ -182,10 +182,9 @@ fn a_curve_measured_across_the_polarisation_that_was_sent_is_named() {
         let text = text.replace("\nreceive_polarisation = \"V\"", &stated);
         std::fs::write(folder.path().join("material.toml"), text).unwrap();
         let add = ["add", "--from", "material.toml"];
-        crate::support::matdb(folder.path()).args(add).assert().success();
-        let run = crate::support::matdb(folder.path())
-            .args(["render", "scene.toml", "-o", "out"])
-            .assert();
+        support::matdb(folder.path()).args(add).assert().success();
+        let run =
+            support::matdb(folder.path()).args(["render", "scene.toml", "-o", "out"]).assert();
         let said = String::from_utf8(run.success().get_output().stderr.clone()).unwrap();
         let notice = "curve `scan` of `my-paint` was measured across the polarisation";
         assert_eq!(said.contains(notice), is_named, "{said}");

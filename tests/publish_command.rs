@@ -12,7 +12,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::support::database::{bytes, contents, refitted, sample, sound, with_effects};
-use crate::support::json_schema::problems;
+use crate::support::{self, json_schema::problems};
 use crate::support::{entries, matdb, refused, root};
 use matdb::store::Store;
 use serde_json::Value;
@@ -25,7 +25,7 @@ fn laboratory() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let mut store = Store::open(folder.path().join("matdb.sqlite")).unwrap();
     store.add([&sample("paint"), &sound("primer")]).unwrap();
-    store.add([&crate::support::database::changed("paint")]).unwrap();
+    store.add([&support::database::changed("paint")]).unwrap();
     fs::write(folder.path().join("about.toml"), ABOUT).unwrap();
     folder
 }
@@ -348,7 +348,7 @@ fn nothing_of_somebody_elses_folder_is_touched() {
     fs::write(at.join("site/changes.json"), "{\"schema_version\":99}").unwrap();
     let said = refused(matdb(at).args(["publish", "site"]));
     assert!(said.contains("newer matdb"), "{said}");
-    assert_eq!(crate::support::entries(at), ["about.toml", "matdb.sqlite", "site"]);
+    assert_eq!(support::entries(at), ["about.toml", "matdb.sqlite", "site"]);
 }
 
 #[cfg(unix)]
@@ -373,7 +373,7 @@ fn what_cannot_be_written_leaves_everything_as_it_was() {
     // Root may write anywhere.
     if fs::write(target.join("probe"), "").is_err() {
         refused(matdb(at).args(["publish", "shelf/site", "-q"]));
-        assert!(crate::support::entries(&target).is_empty());
+        assert!(support::entries(&target).is_empty());
     }
     fs::set_permissions(&target, fs::Permissions::from_mode(0o755)).unwrap();
     fs::write(at.join("file"), "x").unwrap();
@@ -499,13 +499,13 @@ fn resql(site: &Path, sql: &str) {
     let conn = rusqlite::Connection::open(site.join("catalogue.sqlite")).unwrap();
     conn.execute_batch(sql).unwrap();
     drop(conn);
-    crate::support::list_hashes(site);
+    support::list_hashes(site);
 }
 
 /// Changes a file and the list of hashes with it.
 fn relist(site: &Path, path: &str, bytes: &[u8]) {
     fs::write(site.join(path), bytes).unwrap();
-    crate::support::list_hashes(site);
+    support::list_hashes(site);
 }
 
 #[test]
@@ -589,7 +589,7 @@ fn put_values_into_models(site: &Path) {
     }
     drop(statement);
     drop(conn);
-    crate::support::list_hashes(site);
+    support::list_hashes(site);
 }
 
 #[test]

@@ -5,7 +5,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::{entries, matdb, read_cloud, refused};
+use crate::support::{self, entries, matdb, read_cloud, refused};
 use glam::{DMat3, DVec3};
 use matdb::brdf::Brdf;
 use matdb::diagnose;
@@ -414,9 +414,8 @@ fn names(levels: &[Level]) -> Vec<&'static str> {
 
 /// A copy of a built-in material with effects, in the folder's database.
 fn add_material(folder: &Path, name: &str, effects: &str) {
-    let text = fs::read_to_string(
-        crate::support::root().join("materials").join(name).join("material.toml"),
-    );
+    let text =
+        fs::read_to_string(support::root().join("materials").join(name).join("material.toml"));
     let place = folder.join(name);
     fs::create_dir_all(&place).unwrap();
     fs::write(place.join("material.toml"), text.unwrap() + "\n" + effects).unwrap();
@@ -585,8 +584,7 @@ fn mistakes_are_named_with_their_place_and_the_way_out() {
 
 #[test]
 fn a_material_with_an_effect_that_means_nothing_is_not_added() {
-    let ptfe =
-        fs::read_to_string(crate::support::root().join("materials/ptfe/material.toml")).unwrap();
+    let ptfe = fs::read_to_string(support::root().join("materials/ptfe/material.toml")).unwrap();
     for (effect, part) in [
         ("name = \"subsurfac\"", "did you mean `subsurface`?"),
         ("name = \"subsurface\"\nsigma_v = 2", "from 0 to 1"),
@@ -606,7 +604,7 @@ fn a_material_with_an_effect_that_means_nothing_is_not_added() {
 
 #[test]
 fn the_docs_say_where_every_effect_is_written() {
-    let text = fs::read_to_string(crate::support::root().join("docs/scenes.md")).unwrap();
+    let text = fs::read_to_string(support::root().join("docs/scenes.md")).unwrap();
     for effect in library() {
         let start = match effect.level() {
             Level::Scene => "| `[[effect]]` of the scene |",

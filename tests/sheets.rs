@@ -4,7 +4,7 @@
 use std::f64::consts::{LN_2, PI, TAU};
 use std::path::Path;
 
-use crate::support::{matdb, read_cloud, refused};
+use crate::support::{self, matdb, read_cloud, refused};
 use glam::DVec3;
 use matdb::brdf::{Brdf, Fresnel, Lambert, Layered, Scattering, Sum};
 use matdb::frames::{Direction, Point};
@@ -579,8 +579,7 @@ fn the_cloud_has_every_return_with_its_truth() {
 /// A garment of a name of its own whose permittivity is not known.
 fn add_rag(folder: &Path) {
     let text =
-        std::fs::read_to_string(crate::support::root().join("materials/garment/material.toml"))
-            .unwrap();
+        std::fs::read_to_string(support::root().join("materials/garment/material.toml")).unwrap();
     let (before, rest) = text.split_once("[[permittivity]]").unwrap();
     let after = rest.split_once("[[fit]]").unwrap().1;
     let text = format!("{before}[[fit]]{after}").replace("\"garment\"", "\"rag\"");
@@ -590,8 +589,7 @@ fn add_rag(folder: &Path) {
 
 /// A film of a name of its own with a key of its layer replaced; what `add` says of it.
 fn add_film(folder: &Path, from: &str, to: &str) -> std::process::Output {
-    let text =
-        std::fs::read_to_string(crate::support::root().join("materials/kapton/material.toml"));
+    let text = std::fs::read_to_string(support::root().join("materials/kapton/material.toml"));
     let text = text.unwrap().replace("\"kapton\"\nname", "\"film\"\nname").replace(from, to);
     std::fs::write(folder.join("film.toml"), text).unwrap();
     matdb(folder).args(["add", "--from", "film.toml"]).output().unwrap()
@@ -717,7 +715,7 @@ fn a_ray_ends_at_the_sheet_after_the_last_that_it_may_pass() {
 #[test]
 fn what_the_scene_conceals_lies_under_its_shirt_and_outshines_it() {
     let folder = tempfile::tempdir().unwrap();
-    let scene = crate::support::root().join("scenes/concealed-object.toml");
+    let scene = support::root().join("scenes/concealed-object.toml");
     let output =
         matdb(folder.path()).args(["render", "-o", "out", "--all"]).arg(&scene).output().unwrap();
     let summary = String::from_utf8(output.stderr).unwrap();
@@ -755,7 +753,7 @@ fn what_the_scene_conceals_lies_under_its_shirt_and_outshines_it() {
 #[test]
 fn the_skin_of_the_person_is_seen_through_the_shirt() {
     let folder = tempfile::tempdir().unwrap();
-    let scene = crate::support::root().join("scenes/human.toml");
+    let scene = support::root().join("scenes/human.toml");
     matdb(folder.path()).args(["render", "-q", "-o", "out"]).arg(&scene).assert().success();
     let cloud = read_cloud(&folder.path().join("out/cloud.ply"));
     let points = || std::iter::zip(&cloud["region"], &cloud["sheets"]);

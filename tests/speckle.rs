@@ -3,6 +3,7 @@
 
 use std::f64::consts::TAU;
 
+use crate::support;
 use glam::DVec3;
 use matdb::brdf::{Brdf, Fresnel, Lambert, Scattering};
 use matdb::frames::Point;
@@ -167,11 +168,11 @@ fn a_rendered_scan_shows_the_lag_correlations() {
         let text = LINES.replace("seed = 0", &format!("seed = {seed}"));
         std::fs::write(folder.path().join("scene.toml"), text).unwrap();
         let out = format!("out{seed}");
-        crate::support::matdb(folder.path())
+        support::matdb(folder.path())
             .args(["render", "-q", "scene.toml", "-o", &out])
             .assert()
             .success();
-        let cloud = crate::support::read_cloud(&folder.path().join(out).join("cloud.ply"));
+        let cloud = support::read_cloud(&folder.path().join(out).join("cloud.ply"));
         let powers_w: Vec<f64> =
             cloud["power_dbm"].iter().map(|dbm| 10f64.powf(0.1 * dbm)).collect();
         assert_eq!(powers_w.len(), 12 * 41);
@@ -207,10 +208,10 @@ fn powers_mw(seeds: std::ops::Range<u64>) -> Vec<[f64; 2]> {
     for seed in seeds {
         let scene = format!("seed = {seed}\n{ONE_CHIRP_EACH}");
         std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
-        let mut render = crate::support::matdb(folder.path());
+        let mut render = support::matdb(folder.path());
         render.env("RAYON_NUM_THREADS", "1").args(["render", "-q", "scene.toml", "-o", "out"]);
         render.assert().success();
-        let cloud = crate::support::read_cloud(&folder.path().join("out/cloud.ply"));
+        let cloud = support::read_cloud(&folder.path().join("out/cloud.ply"));
         assert_eq!(cloud["chirp"], [0.0, 1.0]);
         powers.push([0, 1].map(|chirp| 10f64.powf(0.1 * cloud["power_dbm"][chirp])));
     }

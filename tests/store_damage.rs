@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::support::database::{contents, is_sound, sound};
-use crate::support::{matdb, refused};
+use crate::support::{self, matdb, refused};
 use matdb::brdf::{Brdf, Lambert, MOST_LEVELS, MOST_MODELS, Mixture, Sum};
 use matdb::material::{Activity, Input, Material, builtin};
 use matdb::store::{Addition, Store, StoreError};
@@ -134,7 +134,7 @@ const DAMAGE: [(&str, &str); 4] = [
 /// A scene of one material.
 fn scene_of(folder: &Path, material: &str) -> PathBuf {
     let path = folder.join("scene.toml");
-    let text = fs::read_to_string(crate::support::scene("bench.toml")).unwrap();
+    let text = fs::read_to_string(support::scene("bench.toml")).unwrap();
     let own: Vec<String> = text
         .lines()
         .map(|line| {
@@ -256,10 +256,7 @@ fn a_material_whose_row_is_lost_comes_back_with_all_that_was_measured() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("matdb.sqlite");
     let own = sound("own");
-    Store::open(&path)
-        .unwrap()
-        .add([&own, &crate::support::database::change(sound("own"))])
-        .unwrap();
+    Store::open(&path).unwrap().add([&own, &support::database::change(sound("own"))]).unwrap();
     let whole = contents(&path);
     assert_eq!(whole.len(), 2);
     tamper(&path, "DELETE FROM material");
@@ -336,7 +333,7 @@ fn one_bad_name_does_not_keep_the_rest_from_being_mended() {
 fn mending_a_revision_of_an_old_program_leaves_its_neighbours_sound() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("matdb.sqlite");
-    fs::copy(crate::support::root().join("tests/fixtures/schema-0003.sqlite"), &path).unwrap();
+    fs::copy(support::root().join("tests/fixtures/schema-0003.sqlite"), &path).unwrap();
     let mut store = Store::open(&path).unwrap();
     let slug = store.list().unwrap()[0].slug.clone();
     let stored = store.get(&slug, None).unwrap().unwrap();

@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::support;
 use crate::support::database::{
     attributed, change, complete, contents, fitted, lit, placed, relative, sample, with_effects,
 };
@@ -119,12 +120,9 @@ fn files_of_every_schema_are_read_as_they_are_and_not_changed() {
         fs::set_permissions(&old, permissions).unwrap();
         assert_eq!(contents(&old), held(&file), "{file}");
         assert!(fs::read(&old).unwrap() == before, "{file} was written to");
-        assert_eq!(crate::support::entries(folder.path()), ["old.sqlite"]);
-        crate::support::matdb(folder.path())
-            .args(["list", "--db", "old.sqlite"])
-            .assert()
-            .success();
-        crate::support::matdb(folder.path())
+        assert_eq!(support::entries(folder.path()), ["old.sqlite"]);
+        support::matdb(folder.path()).args(["list", "--db", "old.sqlite"]).assert().success();
+        support::matdb(folder.path())
             .args(["show", "paint", "--db", "old.sqlite"])
             .assert()
             .success();
@@ -168,14 +166,12 @@ fn a_damaged_fit_does_not_close_a_file_of_an_older_schema() {
         let readable = damaged_fits(&path, case);
         let before = fs::read(&path).unwrap();
         let run = |line: &str| {
-            let output =
-                crate::support::matdb(folder.path()).args(line.split(' ')).output().unwrap();
+            let output = support::matdb(folder.path()).args(line.split(' ')).output().unwrap();
             (output.status.success(), String::from_utf8_lossy(&output.stdout).into_owned())
         };
         assert!(run("list").0, "{case}");
         assert!(fs::read(&path).unwrap() == before, "{case}: a reader has written");
-        let message =
-            crate::support::refused(crate::support::matdb(folder.path()).args(["show", "paint"]));
+        let message = support::refused(support::matdb(folder.path()).args(["show", "paint"]));
         assert!(message.contains("is damaged") && message.contains("check --repair"), "{message}");
         // SQLite writes nothing more once it has read a damaged page.
         for command in ["check", "check --repair"].into_iter().take(1 + readable) {
@@ -230,8 +226,7 @@ fn what_others_have_made_in_the_way_of_a_newer_schema_is_named() {
         let before = schema(&path);
         for command in ["list", "add ptfe", "check", "check --repair"] {
             let arguments = command.split(' ');
-            let message =
-                crate::support::refused(crate::support::matdb(folder.path()).args(arguments));
+            let message = support::refused(support::matdb(folder.path()).args(arguments));
             let wanted = format!("cannot be brought up to date: {problem}; {remedy}");
             assert!(message.contains(&wanted), "{command}: {message}");
             assert!(!message.contains("damaged"), "{command}: {message}");
@@ -240,8 +235,8 @@ fn what_others_have_made_in_the_way_of_a_newer_schema_is_named() {
         let conn = Connection::open(&path).unwrap();
         conn.execute_batch(drop_it).unwrap();
         drop(conn);
-        crate::support::matdb(folder.path()).args(["add", "ptfe", "-q"]).assert().success();
-        assert!(crate::support::database::is_sound(&path), "{sql}");
+        support::matdb(folder.path()).args(["add", "ptfe", "-q"]).assert().success();
+        assert!(support::database::is_sound(&path), "{sql}");
     }
 }
 

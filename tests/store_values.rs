@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::support::database::{contents, fitted};
-use crate::support::{matdb, refused};
+use crate::support::{self, matdb, refused};
 use matdb::brdf::Brdf;
 use matdb::catalogue::{Refit, StoreCheck};
 use matdb::material::{Estimate, FitNumber, Material, builtin};
@@ -21,7 +21,7 @@ const TABLES: [&str; 4] = ["fit", "fit_covariance", "fit_estimate", "fit_paramet
 fn old_file(change: &str) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("matdb.sqlite");
-    let kept = crate::support::root().join("tests/fixtures/fits-of-schema-0010.sqlite");
+    let kept = support::root().join("tests/fixtures/fits-of-schema-0010.sqlite");
     fs::write(&path, fs::read(kept).unwrap()).unwrap();
     Connection::open(&path).unwrap().execute_batch(change).unwrap();
     (folder, path)

@@ -22,6 +22,7 @@ mod stage;
 mod sub_rays;
 mod transmitter;
 
+use crate::support;
 use page::{Row, Section};
 
 const PAGE: &str = "docs/validation.md";
@@ -52,7 +53,7 @@ fn the_page_holds_what_the_crate_computes() {
 
 /// A file that is as it is made; written where that is asked for.
 fn compare_or_write(name: &str, made: &str) {
-    let path = crate::support::root().join(name);
+    let path = support::root().join(name);
     if std::env::var_os("MATDB_WRITE_VALIDATION").is_some() {
         return std::fs::write(path, made).unwrap();
     }
