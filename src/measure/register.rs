@@ -107,8 +107,7 @@ impl Registration {
             return Err(RegistrationError::TooFew { points: count, least: self.least_points });
         }
         let point_rays = PointRays::of(cloud, radar, chirps)?;
-        let points: Vec<DVec3> = cloud.points().iter().map(|point| point.point.xyz).collect();
-        let spot_rays = self.of_spots.then(|| SpotRays::new(radar, &point_rays.rays, &points));
+        let spot_rays = self.of_spots.then(|| SpotRays::new(radar, &point_rays.rays, cloud));
         let view = View::new(mesh, &chirps.rays, cloud, &point_rays.rays, spot_rays.as_ref());
         let along_ray = self.metric == Metric::AlongRay;
         if let Start::Given(given) = &self.start
@@ -149,9 +148,11 @@ impl Registration {
         self.close_along_rays(view, &mut aligned, FEW, &Untold::default());
         aligned.still = true;
         // Far from the truth gaps look like errors that neighbours share, with which any pose would agree.
-        let [strict, kept] = [false, true].map(|are_shared| self.judge(view, &aligned, are_shared));
-        let is_kept = strict.ok()?.or_given(given).kept;
-        Some(kept.ok()?.or_given(given)).filter(|kept| is_kept && kept.kept)
+        if !self.judge(view, &aligned, false).ok()?.or_given(given).kept {
+            return None;
+        }
+        let kept = self.judge(view, &aligned, true).ok()?.or_given(given);
+        kept.kept.then_some(kept)
     }
 
     /// Closes the gaps along the rays, and takes back what the points do not tell. Gaps that are still wide look like errors that

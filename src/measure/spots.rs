@@ -6,6 +6,7 @@
 
 use glam::DVec3;
 
+use super::cloud::Cloud;
 use super::ray_gap::RayGap;
 use super::tracer::{Intersection, RaySet, Tracer};
 use crate::frames::{Global, Pose, Ray};
@@ -25,9 +26,9 @@ pub(super) struct SpotRays {
 
 impl SpotRays {
     /// From the axis of each point's beam; a spot is as wide as the beam at the point.
-    pub fn new(radar: &Radar, axes: &[Ray<Global>], points: &[DVec3]) -> SpotRays {
-        let met =
-            axes.iter().zip(points).map(|(axis, point)| (*axis, point.distance(axis.origin.xyz)));
+    pub fn new(radar: &Radar, axes: &[Ray<Global>], cloud: &Cloud) -> SpotRays {
+        let points = cloud.points().iter().map(|point| point.point.xyz);
+        let met = axes.iter().zip(points).map(|(axis, p)| (*axis, p.distance(axis.origin.xyz)));
         SpotRays {
             rays: spot_rays(radar, met, RAYS),
             cell_m: radar.range_cell_m(),
@@ -138,7 +139,7 @@ mod tests {
         let scan = SyntheticScan::of(mesh, 0.0, 1);
         let axes = PointRays::of(&scan.cloud, &scan.radar, &scan.chirps).unwrap().rays;
         let points: Vec<DVec3> = scan.cloud.points().iter().map(|p| p.point.xyz).collect();
-        let spot_rays = SpotRays::new(&scan.radar, &axes, &points);
+        let spot_rays = SpotRays::new(&scan.radar, &axes, &scan.cloud);
         let here = Pose::from_euler_xyz(DVec3::ZERO, DVec3::ZERO);
         let (tracer, spots) = (Tracer::new(&scan.mesh), Spots::new(&scan.mesh, &spot_rays));
         let gaps = spots.gaps(&tracer, &here, &axes, &points, 0.1);
