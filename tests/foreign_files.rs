@@ -290,18 +290,30 @@ fn a_foreign_curve_is_fitted_compared_and_stored() {
     );
     let added = said(at, &add);
     assert!(added.contains("added sea, revision 1"), "{added}");
-    // A table in the plane of incidence: its backscatter is fitted, all of it is stored.
+    // A table in the plane of incidence.
     let mut plane = "theta_i_deg,theta_s_deg,brdf_per_sr\n".to_owned();
     for k in 0..20 {
-        plane += &format!("{0},{1},0.1\n{0},{0},0.2\n", 3 * k + 1, -(3 * k + 1));
+        let level = 0.1 + 0.002 * f64::from(k % 3);
+        plane += &format!("{0},{1},{level}\n{0},{0},0.1\n", 3 * k + 1, -(3 * k + 1));
     }
     fs::write(at.join("plane.csv"), plane).unwrap();
-    let fit = said(at, "fit plane.csv --model lambert --looks 100");
-    assert!(fit.contains("20 of 40 rows are not backscatter and are left out"), "{fit}");
+    let fit = said(at, "fit plane.csv --model lambert -o plane.svg");
+    assert!(fit.contains("20 of them with source and receiver in two directions"), "{fit}");
+    assert!(fit.contains("converged"), "{fit}");
+    let drawn = fs::read_to_string(at.join("plane.svg")).unwrap();
+    assert!(drawn.contains("incidence 1°") && drawn.contains("receiver"));
+    let error = refused(at, "fit plane.csv --model lambert --method tls");
+    assert!(error.contains("row 1 (from 0) is not backscatter"), "{error}");
+    let near = said(at, "near --curve plane.csv --measured-at 300");
+    assert!(near.contains("at 40 angles of the curve"), "{near}");
     let add = "add --from plane.csv --name plane --class paint --kind synthetic --source drawn --licence CC0-1.0 --frequency 300";
     assert!(said(at, add).contains("added plane"));
     let shown = said(at, "show plane --json");
     assert!(shown.contains("theta_r_rad"), "{shown}");
+    // What is stored is found again by its own fit.
+    let saved = said(at, "fit plane --model lambert --save");
+    assert!(saved.contains("stored as fit"), "{saved}");
+    said(at, "check");
 }
 
 #[test]

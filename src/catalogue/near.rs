@@ -1,17 +1,21 @@
 //! Which known material a measured curve is nearest to.
 //!
-//! The curve is gathered by angle and averaged in linear power, as its statistics are. Where all was
+//! The curve is gathered by angle and averaged in linear power, as its statistics are; where source and receiver were in
+//! two directions, by the pair of these. Where all was
 //! detected the mean is one value; what was below the threshold leaves it anywhere between two. The
 //! difference to a material is that of its own mean over the same angles to the nearer end, in dB, and 0
 //! between the ends. Every angle within the material's range counts, also one with a bound that the
 //! material respects, where the difference is 0; there must be some at which something was detected, so
 //! that silence makes nothing alike.
 
+use std::cmp::Ordering;
+use std::ops::RangeInclusive;
+
 use serde::Serialize;
 
 use crate::brdf::{Brdf, DEGREES, Outline, Scattering, ThroughBeam};
 use crate::frames::{Direction, Surface};
-use crate::material::{Censor, Illumination, Lobes, Observation};
+use crate::material::{Aspect, Censor, Illumination, Lobes, Observation};
 use crate::measure::statistics::by_angle;
 use crate::radar::Footprint;
 use crate::units::db_from_ratio;
@@ -31,13 +35,12 @@ pub struct Probe {
     illumination: Illumination,
 }
 
-/// The curve at one angle, or within one degree.
+/// The curve at one angle, within one degree, or at one pair of directions.
 #[derive(Clone, Debug)]
 struct Bin {
-    theta_rad: Vec<f64>,
-    /// The degrees of incidence that these lie in.
-    first_degree: usize,
-    last_degree: usize,
+    aspects: Vec<Aspect>,
+    /// The first and the last degree of incidence that these lie in; `None` where it is not backscatter.
+    degrees: Option<[usize; 2]>,
     /// Least and greatest mean, dB; the least is −∞ where nothing was detected.
     level_db: [f64; 2],
 }
@@ -81,16 +84,22 @@ impl Distance {
 }
 
 impl Probe {
-    /// Gathers a curve's backscatter; `None` when nothing was detected, or a point lies above the
-    /// instrument's range.
+    /// Gathers a curve; `None` when nothing was detected, or a point lies above the instrument's range.
     pub fn new(observations: &[Observation]) -> Option<Probe> {
-        let retro: Vec<&Observation> = observations.iter().filter(|o| o.is_retro()).collect();
+        if observations.iter().any(|o| o.censor == Censor::Right) {
+            return None;
+        }
+        let (retro, others): (Vec<&Observation>, Vec<&Observation>) =
+            observations.iter().partition(|o| o.is_retro());
         let (mut bins, mut repeats) = (Vec::new(), Vec::new());
         for row in by_angle(observations) {
             let points = within(&retro, row.theta_rad);
-            let detected = points.iter().filter(|o| o.censor == Censor::None);
-            repeats.push(detected.filter_map(|o| o.sigma0).collect());
-            bins.extend(Bin::new(&points, row.mean.map(db_from_ratio)));
+            repeats.push(detected(&points));
+            bins.extend(Bin::of_backscatter(&points, row.mean.map(db_from_ratio)));
+        }
+        for points in by_aspect(others) {
+            repeats.push(detected(&points));
+            bins.extend(Bin::of_aspect(&points));
         }
         let levels = bins.iter().flat_map(|bin| bin.level_db).filter(|level| level.is_finite());
         let floor_db = levels.min_by(f64::total_cmp)?;
@@ -145,8 +154,8 @@ impl Probe {
         let mut silent = 0;
         let mut pairs = Vec::with_capacity(common.len());
         for bin in &common {
-            let sum: f64 = bin.theta_rad.iter().map(|theta| scattering.sigma0(*theta)).sum();
-            let mut level_db = db_from_ratio(sum / bin.theta_rad.len().max(1) as f64);
+            let sum: f64 = bin.aspects.iter().map(|aspect| aspect.sigma0(scattering)).sum();
+            let mut level_db = db_from_ratio(sum / bin.aspects.len().max(1) as f64);
             if !level_db.is_finite() {
                 silent += usize::from(bin.level_db[0].is_finite());
                 level_db = self.floor_db;
@@ -187,13 +196,12 @@ impl Probe {
 
     /// Least and greatest level that stands for a material at an angle, dB.
     fn ends_db(&self, outline: &Outline, footprint: Option<Footprint>, bin: &Bin) -> [f64; 2] {
-        let [low, high] = match outline.ends_db(bin.first_degree..=bin.last_degree) {
-            Some(ends) => ends,
-            None => return [self.floor_db; 2],
-        };
+        // Of other directions than backscatter the outline says nothing.
+        let Some([first, last]) = bin.degrees else { return [f64::NEG_INFINITY, f64::INFINITY] };
+        let Some([low, high]) = outline.ends_db(first..=last) else { return [self.floor_db; 2] };
         let own = Illumination { footprint, ..Illumination::default() };
         // The factor of a footprint rises or falls throughout.
-        let [first_db, last_db] = [bin.first_degree, bin.last_degree + 1].map(|degree| {
+        let [first_db, last_db] = [first, last + 1].map(|degree| {
             let cos_theta = (degree as f64).to_radians().cos();
             db_from_ratio(own.factor_to(self.illumination.footprint, cos_theta))
         });
@@ -209,7 +217,7 @@ impl Probe {
         let common: Vec<&Bin> = self
             .bins
             .iter()
-            .filter(|bin| bin.theta_rad.iter().all(|theta| claimed.contains(theta)))
+            .filter(|bin| bin.aspects.iter().all(|aspect| is_within(&claimed, aspect)))
             .collect();
         let echoes = common.iter().filter(|bin| bin.level_db[0].is_finite()).count();
         let enough = echoes >= LEAST_COMMON && common.len() * 2 >= self.bins.len();
@@ -217,15 +225,47 @@ impl Probe {
     }
 }
 
+/// Whether a material claims its numbers for the directions of both source and receiver.
+fn is_within(claimed: &RangeInclusive<f64>, aspect: &Aspect) -> bool {
+    [aspect.theta_i_rad, aspect.theta_r_rad].iter().all(|theta| claimed.contains(theta))
+}
+
 impl Bin {
-    /// The bin of some points; none where there are no points.
-    fn new(points: &[&Observation], level_db: [f64; 2]) -> Option<Bin> {
+    /// The bin of some points of backscatter; none where there are no points.
+    fn of_backscatter(points: &[&Observation], level_db: [f64; 2]) -> Option<Bin> {
         let mut theta_rad: Vec<f64> = points.iter().map(|o| o.theta_i_rad).collect();
         theta_rad.sort_by(f64::total_cmp);
         let theta_rad = thinned(&theta_rad);
-        let (first_degree, last_degree) = (degree(*theta_rad.first()?), degree(*theta_rad.last()?));
-        Some(Bin { theta_rad, first_degree, last_degree, level_db })
+        let degrees = Some([degree(*theta_rad.first()?), degree(*theta_rad.last()?)]);
+        let aspects = theta_rad.into_iter().map(Aspect::retro).collect();
+        Some(Bin { aspects, degrees, level_db })
     }
+
+    /// The bin of points of one pair of directions; none where one has no level.
+    fn of_aspect(points: &[&Observation]) -> Option<Bin> {
+        let (mut least, mut greatest) = (0.0, 0.0);
+        for point in points {
+            let level = point.level_sigma0()?;
+            least += if point.is_censored() { 0.0 } else { level };
+            greatest += level;
+        }
+        let mean_db = |sum: f64| db_from_ratio(sum / points.len() as f64);
+        let aspects = points.first().map(|point| point.aspect()).into_iter().collect();
+        Some(Bin { aspects, degrees: None, level_db: [mean_db(least), mean_db(greatest)] })
+    }
+}
+
+/// Detected levels, σ⁰.
+fn detected(points: &[&Observation]) -> Vec<f64> {
+    let detected = points.iter().filter(|o| o.censor == Censor::None);
+    detected.filter_map(|o| o.sigma0).collect()
+}
+
+/// The points of each pair of directions.
+fn by_aspect(mut points: Vec<&Observation>) -> Vec<Vec<&Observation>> {
+    let angles = |o: &Observation| [o.theta_i_rad, o.theta_r_rad, o.delta_phi_rad];
+    points.sort_by(|a, b| angles(a).partial_cmp(&angles(b)).unwrap_or(Ordering::Equal));
+    points.chunk_by(|a, b| a.aspect() == b.aspect()).map(<[&Observation]>::to_vec).collect()
 }
 
 /// The whole degree of incidence that an angle lies in.
@@ -442,6 +482,36 @@ mod tests {
         let points: Vec<_> = [5.0, 9.0, 14.0].into_iter().flat_map(pair).collect();
         let noise = Probe::new(&curve(&points)).unwrap().noise_db().unwrap();
         assert!((noise - 0.5 * 10.0 / std::f64::consts::LN_10).abs() < 1e-9, "{noise}");
+    }
+
+    #[test]
+    fn a_table_of_two_directions_is_nearest_to_the_law_that_made_it() {
+        let law = |slug: &str| builtin::get(slug).unwrap().unwrap();
+        let names: Vec<&str> = builtin::names().collect();
+        let own = law(names[0]);
+        let scattering = own.scattering().unwrap();
+        let directions = [(10.0, 5.0), (10.0, 20.0), (10.0, 30.0), (20.0, 15.0), (20.0, 30.0)];
+        let points: Vec<Observation> = directions
+            .into_iter()
+            .map(|(i_deg, o_deg): (f64, f64)| {
+                let theta_r_rad = o_deg.to_radians();
+                let delta_phi_rad = std::f64::consts::PI;
+                let point = Observation::backscatter(i_deg.to_radians(), None, None);
+                let point = Observation { theta_r_rad, delta_phi_rad, ..point };
+                let sigma0 = Some(3.0 * point.aspect().sigma0(&scattering));
+                Observation { sigma0, censor: Censor::None, ..point }
+            })
+            .collect();
+        let probe = Probe::new(&points).unwrap();
+        assert_eq!(probe.angles(), 5);
+        let shape = |other: &Material| {
+            probe
+                .distance(&other.scattering().unwrap(), other.theta_rad)
+                .map_or(1e9, |d| d.rms_shape_db)
+        };
+        assert!(shape(&own) < 1e-9, "{}", shape(&own));
+        let others = names[1..].iter().filter(|name| shape(&law(name)) < 1e-9);
+        assert_eq!(others.count(), 0);
     }
 
     #[test]

@@ -13,11 +13,12 @@ use nalgebra::DVector;
 use super::clouds;
 use super::error::DiagnoseError;
 use super::evidence::{Candidate, CloudGain, Evidence, Largest};
-use super::exchange::{EVEN, SAME, exchange};
+use super::exchange::{SAME, exchange};
 use super::explanation::{Addition, Explanation};
 use super::field::Structure;
 use super::refit::{Fit, SCOUT};
 use super::scorer::{HeldOut, State};
+use super::settings::gain_of_starts;
 use super::space::Space;
 use super::support::Judge;
 use super::trial::{Search, Trial};
@@ -177,8 +178,8 @@ struct Contender {
 struct Settled<'a> {
     trial: usize,
     candidate: Candidate,
-    /// What speaks against it beside its likelihood, in ln p.
-    against: f64,
+    /// What it is [worth](State::worth), less what chance gives the best of its starts.
+    worth: f64,
     state: State<'a>,
 }
 
@@ -193,8 +194,7 @@ fn add_best<'a>(search: &Search, model: &mut Explanation<'a>, trials: &mut [Tria
         contenders.remove(0);
     }
     let Some(first) = contenders.first() else { return false };
-    // Of those that predict equally well, by the rule of one standard error, the one with the fewest parameters in use and
-    // the laws nearest to those stored is added, and of equals the likelier.
+    // Of those that predict equally well, by the rule of one standard error, the one that is worth most is added.
     let mut tied = Vec::new();
     for other in &contenders {
         let [worse, se] = scorer.difference(&first.held_out, &other.held_out);
@@ -207,14 +207,14 @@ fn add_best<'a>(search: &Search, model: &mut Explanation<'a>, trials: &mut [Tria
     // Laws far from those stored may be as likely as near ones: each is judged by the nearer.
     let mut settled = Vec::new();
     for one in tied {
-        let Trial { space, fit, candidate, .. } = &trials[one.trial];
+        let Trial { space, fit, candidate, tried, .. } = &trials[one.trial];
         let (space, fit, held_out) = (space.clone(), fit.clone(), one.held_out.clone());
         let state = scorer.settle(&model.state, space, fit, held_out);
-        let against = state.space.against(&state.fit.at);
-        settled.push(Settled { trial: one.trial, candidate: candidate.clone(), against, state });
+        let worth = state.worth() - gain_of_starts(*tried);
+        settled.push(Settled { trial: one.trial, candidate: candidate.clone(), worth, state });
     }
-    let least = settled.iter().map(|one| one.against).fold(f64::INFINITY, f64::min);
-    let Some(best) = settled.iter().find(|one| one.against < least + EVEN) else { return false };
+    let most = settled.iter().max_by(|a, b| a.worth.total_cmp(&b.worth));
+    let Some(best) = most else { return false };
     // Of its family the simplest member.
     let chosen = best.candidate.clone();
     let family = settled.iter().filter(|one| one.candidate.is_same(&chosen));

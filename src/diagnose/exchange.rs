@@ -12,9 +12,6 @@ use crate::effects::Effect;
 /// Difference in ln p of all held-out shots below which two effects predict equally well: odds of twenty to one.
 pub(super) const SAME: f64 = 3.0;
 
-/// Difference in what speaks against two effects below which the likelier one is better: a parameter in use.
-pub(super) const EVEN: f64 = 1.0;
-
 /// Compares each of several effects with its rivals, and replaces it by a better one.
 pub(super) fn exchange<'a>(search: &Search, model: &mut Explanation<'a>) {
     if model.added.len() < 2 {
@@ -60,12 +57,10 @@ fn contest<'a>(
     if candidate.is_excluded() {
         return;
     }
-    // Of effects that predict equally well the one with fewer parameters in use and nearer laws is better.
+    // Of effects that predict equally well the one that is worth more is better.
     let [better, se] = scorer.difference(&with_rival.held_out, &state.held_out);
     let is_tied = better.abs() <= (scorer.settings.standard_errors * se).max(SAME);
-    let [own, other] = [&*state, &with_rival].map(|state| state.space.against(&state.fit.at));
-    let differs = (own - other).abs() >= EVEN;
-    let is_better = if is_tied && differs { other < own } else { better > 0.0 };
+    let is_better = if is_tied { with_rival.worth() > state.worth() } else { better > 0.0 };
     let mut loser = rival.name();
     if is_better {
         let placebo_gain = judge.placebo_gain(candidate.numbers);

@@ -47,6 +47,13 @@ pub(super) struct State<'a> {
     pub held_out: HeldOut,
 }
 
+impl State<'_> {
+    /// ln likelihood, less what speaks against the point of the fit.
+    pub fn worth(&self) -> f64 {
+        self.fit.ln_likelihood - self.space.against(&self.fit.at)
+    }
+}
+
 /// What a model says of data that took no part in its fit.
 #[derive(Clone, Default)]
 pub(super) struct HeldOut {

@@ -49,8 +49,13 @@ impl Diagnosis {
     /// Least gain in ln likelihood of an effect with this number of parameters, searched from this number of
     /// starts. By chance it is about as rare as [`Diagnosis::least_gain`] is for one parameter.
     pub(super) fn least_gain_of(&self, numbers: usize, starts: usize) -> f64 {
-        self.least_gain + 1.2 * (numbers as f64 - 1.0) + (0.25 * starts as f64).max(1.0).ln()
+        self.least_gain + 1.2 * (numbers as f64 - 1.0) + gain_of_starts(starts)
     }
+}
+
+/// What the best of so many starts gains by chance over that of a few, in ln likelihood.
+pub(super) fn gain_of_starts(starts: usize) -> f64 {
+    (0.25 * starts as f64).max(1.0).ln()
 }
 
 impl Default for Diagnosis {

@@ -30,9 +30,17 @@ pub enum FitError {
         /// Number of unknowns.
         unknowns: usize,
     },
-    /// A row that is not backscatter.
+    /// A row without a level.
     #[error(transparent)]
     Observation(#[from] ObservationError),
+    /// A row whose source and receiver were in two directions, for a method that knows backscatter alone.
+    #[error(
+        "row {row} (from 0) is not backscatter, and least squares knows nothing else; use the method censored"
+    )]
+    Bistatic {
+        /// Row, from 0.
+        row: usize,
+    },
     /// A value of a row is out of range.
     #[error("row {row} (from 0) has {name} = {}, {wanted}; correct or remove it", shown(*value))]
     Row {

@@ -10,8 +10,8 @@ use statrs::function::erf::{erfc, erfc_inv};
 use super::coordinates::Coordinates;
 use super::likelihood::Likelihood;
 use super::settings::{Fit, Method};
-use super::table::{Angles, Place};
-use crate::material::{Goodness, Observation};
+use super::table::Angles;
+use crate::material::{Aspect, Goodness, Observation};
 use crate::radar::random::{Key, Purpose};
 use crate::radar::speckle::standard_deviation_db;
 use crate::units::db_from_ratio;
@@ -23,14 +23,16 @@ pub(super) fn residuals_db(
     at: &DVector<f64>,
     rows: &[Observation],
 ) -> Vec<f64> {
-    let table = coordinates.table(at, Angles::knots());
+    let aspects: Vec<Aspect> = rows.iter().map(Observation::aspect).collect();
+    let (angles, places) = Angles::of(&aspects);
+    let table = coordinates.table(at, &angles);
     let noise_w = fit.noise_w.unwrap_or(0.0);
-    let detected = rows.iter().filter(|row| !row.is_censored());
+    let detected = rows.iter().zip(&places).filter(|(row, _)| !row.is_censored());
     detected
-        .filter_map(|row| {
+        .filter_map(|(row, place)| {
             let sigma0 = row.sigma0?;
             let noise = noise_w * sigma0 / row.power_w.unwrap_or(sigma0);
-            let model = table.at(&Place::new(row.theta_i_rad)).exp() + noise;
+            let model = table.at(place).exp() + noise;
             Some(db_from_ratio(sigma0) - db_from_ratio(model))
         })
         .collect()

@@ -89,7 +89,8 @@ fn judge_rows(result: &FitResult, rows: &[Observation]) -> Vec<Finding> {
         _ => SPLIT_DEG,
     };
     let detected: Vec<&Observation> = rows.iter().filter(|row| !row.is_censored()).collect();
-    let near = detected.iter().filter(|row| row.theta_i_rad.to_degrees() < split_deg).count();
+    let tilt_deg = |row: &Observation| row.aspect().half_angle_rad().to_degrees();
+    let near = detected.iter().filter(|row| tilt_deg(row) < split_deg).count();
     let is_mixture = matches!(result.model, Brdf::Mixture(_));
     if is_mixture && near == 0 {
         findings.push(Finding::NoSpecularRows { below_deg: split_deg });

@@ -17,7 +17,7 @@ use super::gamma_law::{GammaLaw, LnProbability};
 use super::minimise::Local;
 use super::sensitivity::derivatives;
 use super::table::{Angles, Place, Table};
-use crate::material::Observation;
+use crate::material::{Aspect, Observation};
 
 /// Rows that one task sums, fixed so that the sum is the same on any number of threads.
 const CHUNK: usize = 256;
@@ -46,6 +46,16 @@ pub(super) struct Likelihood<'a> {
 /// True angles, rad, with their weights, of a measured angle and its standard deviation, both in rad.
 type AnglesOfRow = fn(f64, f64) -> Vec<(f64, f64)>;
 
+/// Aspects that a row may have had, with their weights: those of its true angles, or its own, which is exact, where source
+/// and receiver were in two directions.
+fn true_aspects(row: &Observation, angles: AnglesOfRow) -> Vec<(Aspect, f64)> {
+    if !row.is_retro() {
+        return vec![(row.aspect(), 1.0)];
+    }
+    let angles = angles(row.theta_i_rad, row.theta_sd_rad.unwrap_or(0.0));
+    angles.into_iter().map(|(theta_rad, weight)| (Aspect::retro(theta_rad), weight)).collect()
+}
+
 /// One row; its power is in units of σ⁰.
 #[derive(Clone, Debug)]
 struct Chirp {
@@ -60,7 +70,6 @@ struct Chirp {
 /// A true angle that a row may have.
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    theta_rad: f64,
     place: Place,
     ln_weight: f64,
 }
@@ -103,22 +112,20 @@ impl<'a> Likelihood<'a> {
         noise_w: f64,
         angles: AnglesOfRow,
     ) -> Likelihood<'a> {
-        let mut chirps: Vec<Chirp> =
-            rows.iter().map(|row| Chirp::new(row, noise_w, angles)).collect();
+        let aspects: Vec<Vec<(Aspect, f64)>> =
+            rows.iter().map(|row| true_aspects(row, angles)).collect();
+        let all: Vec<Aspect> = aspects.iter().flatten().map(|(aspect, _)| *aspect).collect();
+        let (angles, places) = Angles::of(&all);
+        let mut places = places.into_iter();
+        let mut chirps = Vec::with_capacity(rows.len());
+        for (row, aspects) in rows.iter().zip(aspects) {
+            let weights = aspects.into_iter().map(|(_, weight)| weight.ln());
+            let nodes =
+                weights.zip(&mut places).map(|(ln_weight, place)| Node { place, ln_weight });
+            chirps.push(Chirp::new(row, noise_w, nodes.collect()));
+        }
         let has_limit = |chirp: &&Chirp| chirp.censored || chirp.ln_limit.is_some();
         let limits = chirps.iter().filter(has_limit).map(|c| c.nodes.len()).sum();
-        let theta_rad: Vec<f64> =
-            chirps.iter().flat_map(|c| &c.nodes).map(|n| n.theta_rad).collect();
-        // A law at the angles of a short curve is cheaper than at all knots.
-        let exact = Angles::exact(&theta_rad);
-        let angles = exact.map_or_else(
-            || Angles::knots().clone(),
-            |(angles, places)| {
-                let nodes = chirps.iter_mut().flat_map(|chirp| &mut chirp.nodes);
-                nodes.zip(places).for_each(|(node, place)| node.place = place);
-                angles
-            },
-        );
         Likelihood { coordinates, chirps, angles, limits }
     }
 
@@ -211,20 +218,14 @@ impl Scratch {
 
 impl Chirp {
     /// Prepares a row that has a σ⁰ or a limit.
-    fn new(row: &Observation, noise_w: f64, angles: AnglesOfRow) -> Chirp {
+    fn new(row: &Observation, noise_w: f64, nodes: Vec<Node>) -> Chirp {
         let sigma0 = row.level_sigma0().unwrap_or(f64::NAN);
-        let angles = angles(row.theta_i_rad, row.theta_sd_rad.unwrap_or(0.0));
-        let node = |(theta_rad, weight): (f64, f64)| Node {
-            theta_rad,
-            place: Place::new(theta_rad),
-            ln_weight: weight.ln(),
-        };
         Chirp {
             ln_sigma0: sigma0.ln(),
             noise: noise_w * sigma0 / row.power_w.unwrap_or(sigma0),
             censored: row.is_censored(),
             ln_limit: row.threshold_sigma0.filter(|_| !row.is_censored()).map(f64::ln),
-            nodes: angles.into_iter().map(node).collect(),
+            nodes,
         }
     }
 

@@ -8,10 +8,10 @@ use super::interval::DEVIATE_95;
 use super::minimise::Stop;
 use super::sensitivity::derivatives;
 use super::settings::Fit;
-use super::table::{Angles, Place};
+use super::table::{Angles, Table};
 use super::verdict::Finding;
-use crate::brdf::{Brdf, Scattering, ThroughBeam};
-use crate::material::{CrossValidation, Estimate, Goodness};
+use crate::brdf::{Brdf, ThroughBeam};
+use crate::material::{Aspect, CrossValidation, Estimate, Goodness};
 
 /// A 95 % band of the fitted mean σ⁰.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -78,15 +78,21 @@ impl FitResult {
     ///
     /// Directions that the data do not determine and numbers at a bound do not widen it.
     pub fn band(&self, theta_rad: f64) -> Band {
-        let place = Place::new(theta_rad);
-        let here = self.coordinates.table(&self.at, Angles::knots());
-        let by = derivatives(&self.coordinates, &self.at, Angles::knots(), &here);
-        let slopes = by.iter().map(|table| table.as_ref().map_or(0.0, |table| table.at(&place)));
-        let slopes = DVector::from_iterator(self.at.len(), slopes);
+        self.band_of(Aspect::retro(theta_rad))
+    }
+
+    /// The same in any aspect.
+    pub fn band_of(&self, aspect: Aspect) -> Band {
+        let (angles, places) = Angles::of(&[aspect]);
+        let here = self.coordinates.table(&self.at, &angles);
+        let by = derivatives(&self.coordinates, &self.at, &angles, &here);
+        let slope =
+            |table: &Option<Table>| table.as_ref().map_or(0.0, |table| table.at(&places[0]));
+        let slopes = DVector::from_iterator(self.at.len(), by.iter().map(slope));
         let variance = slopes.dot(&(&self.covariance_searched * &slopes));
         let factor = (DEVIATE_95 * variance.max(0.0).sqrt()).exp();
         let beam_rad = self.fit.beam_rad.unwrap_or(0.0);
-        let mid = ThroughBeam { law: &self.model, beam_rad }.sigma0(theta_rad);
+        let mid = aspect.sigma0(&ThroughBeam { law: &self.model, beam_rad });
         Band { low: mid / factor, mid, high: mid * factor }
     }
 

@@ -8,7 +8,7 @@ use super::settings::{Fit, Method};
 use super::summary::summarise;
 use crate::brdf::Brdf;
 use crate::material::Observation;
-use crate::measure::curve::{Curve, backscatter_level};
+use crate::measure::curve::{Curve, level_sigma0};
 
 impl Fit {
     /// Fits a model to a curve, starting at the model as given.
@@ -21,7 +21,12 @@ impl Fit {
         check_rows(&curve.observations)?;
         let looks = match self.method {
             Method::Censored => self.looks,
-            Method::Mse { .. } | Method::Tls { .. } => Some(self.looks.unwrap_or(1.0)),
+            Method::Mse { .. } | Method::Tls { .. } => {
+                if let Some(row) = curve.observations.iter().position(|row| !row.is_retro()) {
+                    return Err(FitError::Bistatic { row });
+                }
+                Some(self.looks.unwrap_or(1.0))
+            }
         };
         let mut coordinates = Coordinates::new(start, &self.fixed, &self.bounds, looks)?
             .seen_by(self.beam_rad.unwrap_or(0.0));
@@ -52,16 +57,29 @@ fn check_rows(rows: &[Observation]) -> Result<(), FitError> {
     rows.iter().enumerate().try_for_each(|(index, row)| check_row(index, row))
 }
 
-/// Refuses a row that is not backscatter or has a number without a meaning; `row` counts from 0.
+/// Refuses a row that has no level, or a number without a meaning; `row` counts from 0.
 fn check_row(row: usize, observation: &Observation) -> Result<(), FitError> {
     const QUARTER_RAD: f64 = std::f64::consts::FRAC_PI_2;
     let theta_sd_rad = observation.theta_sd_rad.unwrap_or(0.0);
-    for (name, value) in [("theta_rad", observation.theta_i_rad), ("theta_sd_rad", theta_sd_rad)] {
+    for (name, value) in [
+        ("theta_rad", observation.theta_i_rad),
+        ("theta_r_rad", observation.theta_r_rad),
+        ("theta_sd_rad", theta_sd_rad),
+    ] {
         if !(0.0..=QUARTER_RAD).contains(&value) {
             return Err(FitError::Row { row, name, value, wanted: "not from 0 to π/2" });
         }
     }
-    let sigma0 = backscatter_level(row, observation)?;
+    if !observation.delta_phi_rad.is_finite() {
+        let (name, value) = ("delta_phi_rad", observation.delta_phi_rad);
+        return Err(FitError::Row { row, name, value, wanted: "not a number" });
+    }
+    if theta_sd_rad > 0.0 && !observation.is_retro() {
+        let wanted =
+            "where source and receiver were in two directions, whose angles count as exact";
+        return Err(FitError::Row { row, name: "theta_sd_rad", value: theta_sd_rad, wanted });
+    }
+    let sigma0 = level_sigma0(row, observation)?;
     for (name, value) in [("sigma0", sigma0), ("power_w", observation.power_w.unwrap_or(sigma0))] {
         if !(value.is_finite() && value > 0.0) {
             return Err(FitError::Row { row, name, value, wanted: "not above 0" });
@@ -78,6 +96,8 @@ mod tests {
     use crate::fit::result::Band;
     use crate::fit::twin::{Twin, mixture};
     use crate::fit::verdict::Finding;
+    use crate::material::Aspect;
+    use crate::radar::random::{Key, Purpose};
     use crate::units::db_from_ratio;
 
     fn start() -> Brdf {
@@ -315,6 +335,69 @@ mod tests {
         let least = Fit { method: Method::Mse { split_rad: 0.1 }, ..quick() };
         let said = least.run(&start(), &curve).unwrap().verdict;
         assert!(said.contains(&Finding::CutIgnored), "{said:?}");
+    }
+
+    /// A table in the plane of incidence of a law, of which each level is off by some looks of speckle.
+    fn plane(law: &Brdf, looks: f64) -> Curve {
+        let mut rows = Vec::new();
+        for (incidence_deg, chirp) in [10.0f64, 30.0, 50.0].into_iter().zip(0u32..) {
+            for (receiver_deg, place) in (-80..=80i32).step_by(2).zip(0u32..) {
+                let chirp = 1000 * chirp + place;
+                let key = Key { seed: 3, chirp: chirp.into(), sub_ray: 0, purpose: Purpose::Fit };
+                let row = Observation {
+                    theta_r_rad: f64::from(receiver_deg.abs()).to_radians(),
+                    delta_phi_rad: if receiver_deg > 0 { std::f64::consts::PI } else { 0.0 },
+                    chirp: Some(chirp),
+                    ..Observation::backscatter(incidence_deg.to_radians(), Some(1.0), None)
+                };
+                let noise = 1.0 + key.draws().complex_gaussian().re * (2.0 / looks).sqrt();
+                let sigma0 = row.aspect().sigma0(law) * noise.max(0.1);
+                rows.push(Observation { sigma0: Some(sigma0), ..row });
+            }
+        }
+        Curve { observations: rows, ..Curve::default() }
+    }
+
+    #[test]
+    fn a_law_is_found_from_two_directions_as_from_one() {
+        let truth = mixture(0.2, 3.0, 0.05, 0.004);
+        let curve = plane(&truth, 100.0);
+        let found = Fit::default().run(&mixture(0.6, 30.0, 0.01, 0.02), &curve).unwrap();
+        assert!(found.converged, "{found:?}");
+        for (name, truth) in [
+            (SPECULAR_LEVEL, 0.05),
+            ("specular.m", 0.2),
+            (DIFFUSE_LEVEL, 0.004),
+            ("diffuse.alpha", 3.0),
+        ] {
+            let estimate = found.estimate(name).unwrap();
+            let off = (estimate.value - truth).abs() / estimate.sd.unwrap();
+            assert!(off < 4.0, "{name}: {estimate:?}");
+        }
+        assert!((found.looks.unwrap() / 100.0).ln().abs() < 0.5, "{:?}", found.looks);
+        let mirror =
+            Aspect { theta_i_rad: 0.5, theta_r_rad: 0.5, delta_phi_rad: std::f64::consts::PI };
+        let Band { low, mid, high } = found.band_of(mirror);
+        let level = mirror.sigma0(&truth);
+        assert!(low < mid && mid < high && (level / mid).ln().abs() < 2.0 * (high / mid).ln());
+        let held = found.hold_out(&curve).unwrap();
+        assert!(held.rms_db < 1.2 * found.goodness.rms_db, "{held:?}");
+        // The data are others where they are seen from elsewhere.
+        let mut moved = curve.clone();
+        moved.observations[0].theta_r_rad += 1e-3;
+        let again = quick().run(&found.model, &moved).unwrap();
+        assert_ne!(again.data_hash, found.data_hash);
+    }
+
+    #[test]
+    fn what_two_directions_do_not_allow_is_refused() {
+        let mut curve = plane(&start(), 100.0);
+        let method = Method::Mse { split_rad: 0.1 };
+        let refused = Fit { method, ..quick() }.run(&start(), &curve).unwrap_err();
+        assert_eq!(refused, FitError::Bistatic { row: 0 });
+        curve.observations[5].theta_sd_rad = Some(0.01);
+        let refused = quick().run(&start(), &curve).unwrap_err().to_string();
+        assert!(refused.contains("row 5") && refused.contains("two directions"), "{refused}");
     }
 
     #[test]

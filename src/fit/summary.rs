@@ -110,6 +110,10 @@ fn data_hash(rows: &[Observation]) -> String {
         }
         hasher.update(&row.chirp.unwrap_or(index).to_le_bytes());
         hasher.update(&[u8::from(row.is_censored())]);
+        // Only where it is not backscatter, so that hashes of before stay.
+        for angle_rad in [row.theta_r_rad, row.delta_phi_rad].iter().filter(|_| !row.is_retro()) {
+            hasher.update(&angle_rad.to_le_bytes());
+        }
         // Only where a detection would not be there below it, so that hashes of before stay.
         if let Some(limit) = row.threshold_sigma0.filter(|_| !row.is_censored()) {
             hasher.update(&limit.to_le_bytes());

@@ -5,11 +5,13 @@
 //! at θ = θ_end·sinh(βx)/sinh β, x uniform: dense at the specular peak, where the curve bends most.
 //! The curve is even in θ, which gives the knot below the first.
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::cmp::Ordering;
+use std::f64::consts::FRAC_PI_2;
 use std::sync::LazyLock;
 
-use crate::brdf::{Retro, Scattering};
+use crate::brdf::{Retro, Scattering, ThroughBeam};
 use crate::frames::{Direction, Surface};
+use crate::material::Aspect;
 
 /// Intervals between knots.
 const INTERVALS: usize = 1024;
@@ -23,15 +25,17 @@ const LN_NOTHING: f64 = -600.0;
 /// The angle of every knot.
 static KNOTS: LazyLock<Angles> = LazyLock::new(|| {
     let share = |knot: usize| (BETA * knot as f64 / INTERVALS as f64).sinh() / BETA.sinh();
-    Angles::these((0..=INTERVALS).map(|knot| THETA_END_RAD * share(knot)))
+    Angles::these((0..=INTERVALS).map(|knot| Aspect::retro(THETA_END_RAD * share(knot))).collect())
 });
 
 /// sinh β/θ_end: the argument of asinh per rad of θ, 1/rad.
 static STRETCH_PER_RAD: LazyLock<f64> = LazyLock::new(|| BETA.sinh() / THETA_END_RAD);
 
-/// The angles at which laws are tabulated: the knots, or the few angles that a curve has.
+/// The aspects of a surface for which laws are tabulated: backscatter at the knots, or the few aspects of a curve.
 #[derive(Clone, Debug)]
 pub(super) struct Angles {
+    aspects: Vec<Aspect>,
+    /// Towards the radar, where all are backscatter.
     to_radar: Vec<Direction<Surface>>,
 }
 
@@ -41,26 +45,37 @@ impl Angles {
         &KNOTS
     }
 
-    /// These angles, rad, and the place of each among them; `None` for more of them than there are knots, which are
-    /// the cheaper ones then.
-    pub fn exact(theta_rad: &[f64]) -> Option<(Angles, Vec<Place>)> {
-        let mut different = theta_rad.to_vec();
-        different.sort_by(f64::total_cmp);
+    /// These aspects and the place of each among them, or the knots where that is cheaper: where all are backscatter, and
+    /// more than there are knots.
+    pub fn of(aspects: &[Aspect]) -> (Angles, Vec<Place>) {
+        let mut different = aspects.to_vec();
+        different.sort_by(order);
         different.dedup();
-        if different.len() > INTERVALS {
-            return None;
+        if different.len() > INTERVALS && different.iter().all(|aspect| aspect.is_retro()) {
+            let places = aspects.iter().map(|aspect| Place::new(aspect.theta_i_rad)).collect();
+            return (Angles::knots().clone(), places);
         }
-        let place = |theta_rad: &f64| {
-            let knot = different.partition_point(|other| other < theta_rad) as u16;
+        let place = |aspect: &Aspect| {
+            let knot = different.partition_point(|other| order(other, aspect).is_lt()) as u32;
             Place { knots: [knot; 4], weights: [1.0, 0.0, 0.0, 0.0], slopes_per_rad: [0.0; 4] }
         };
-        let places = theta_rad.iter().map(place).collect();
-        Some((Angles::these(different.into_iter()), places))
+        let places = aspects.iter().map(place).collect();
+        (Angles::these(different), places)
     }
 
-    fn these(theta_rad: impl Iterator<Item = f64>) -> Angles {
-        Angles { to_radar: theta_rad.map(|theta| Direction::from_angles(theta, 0.0)).collect() }
+    fn these(aspects: Vec<Aspect>) -> Angles {
+        let are_retro = aspects.iter().all(|aspect| aspect.is_retro());
+        let retro = aspects.iter().filter(|_| are_retro);
+        let to_radar = retro.map(|aspect| aspect.directions()[0]).collect();
+        Angles { aspects, to_radar }
     }
+}
+
+/// By the angles one after another.
+fn order(a: &Aspect, b: &Aspect) -> Ordering {
+    let angles = |aspect: &Aspect| [aspect.theta_i_rad, aspect.theta_r_rad, aspect.delta_phi_rad];
+    let pairs = std::iter::zip(angles(a), angles(b));
+    pairs.map(|(a, b)| a.total_cmp(&b)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
 }
 
 /// ln σ⁰ at every knot.
@@ -73,7 +88,7 @@ pub(super) struct Table {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     /// The four knots around it.
-    knots: [u16; 4],
+    knots: [u32; 4],
     /// Their Lagrange weights.
     weights: [f64; 4],
     /// Weights of the derivative by θ, 1/rad.
@@ -83,11 +98,18 @@ pub(super) struct Place {
 impl Table {
     /// Tabulates a law as a beam of the divergence `beam_rad` sees it; without a beam, 0, the law itself.
     pub fn new(law: &dyn Scattering, beam_rad: f64, angles: &Angles) -> Table {
-        let looks: Vec<(f64, Direction<Surface>)> =
-            angles.to_radar.iter().map(|to_radar| (beam_rad, *to_radar)).collect();
-        let f_per_sr = Retro::new(law).per_sr(&looks);
-        let ln_sigma0 = looks.iter().zip(f_per_sr).map(|((_, v), f_per_sr)| {
-            let ln_sigma0 = (4.0 * PI * f_per_sr * v.cos_theta().powi(2)).ln();
+        let Angles { aspects, to_radar } = angles;
+        let sigma0: Vec<f64> = if to_radar.is_empty() {
+            let seen = ThroughBeam { law, beam_rad };
+            aspects.iter().map(|aspect| aspect.sigma0(&seen)).collect()
+        } else {
+            let looks: Vec<(f64, Direction<Surface>)> =
+                to_radar.iter().map(|to_radar| (beam_rad, *to_radar)).collect();
+            let f_per_sr = Retro::new(law).per_sr(&looks);
+            aspects.iter().zip(f_per_sr).map(|(aspect, f)| aspect.sigma0_per_f() * f).collect()
+        };
+        let ln_sigma0 = sigma0.into_iter().map(|sigma0| {
+            let ln_sigma0 = sigma0.ln();
             if ln_sigma0.is_nan() { LN_NOTHING } else { ln_sigma0.max(LN_NOTHING) }
         });
         Table { knots: ln_sigma0.collect() }
@@ -119,8 +141,8 @@ impl Table {
         self.weighted(place, &place.slopes_per_rad)
     }
 
-    fn knot(&self, index: u16) -> f64 {
-        self.knots.get(usize::from(index)).copied().unwrap_or(LN_NOTHING)
+    fn knot(&self, index: u32) -> f64 {
+        self.knots.get(index as usize).copied().unwrap_or(LN_NOTHING)
     }
 
     /// The sum of the knots around a place with these weights.
@@ -156,7 +178,7 @@ impl Place {
         let turned = if theta_rad < 0.0 { -dx_dtheta } else { dx_dtheta };
         let below = if cell == 0 { 1 } else { cell - 1 };
         let place = Place {
-            knots: [below, cell, cell + 1, cell + 2].map(|knot| knot as u16),
+            knots: [below, cell, cell + 1, cell + 2].map(|knot| knot as u32),
             weights,
             slopes_per_rad: slopes.map(|slope| slope * turned),
         };
@@ -227,7 +249,7 @@ mod tests {
     #[test]
     fn the_angles_of_a_short_curve_are_not_interpolated() {
         let theta_rad = [0.3, 0.0, 1.2, 0.3, 0.05];
-        let (angles, places) = Angles::exact(&theta_rad).unwrap();
+        let (angles, places) = Angles::of(&theta_rad.map(Aspect::retro));
         let model = mixture(0.05, 6.0, 0.05, 0.002);
         let table = Table::new(&model, 0.0, &angles);
         assert_eq!(table.values().len(), 4);
@@ -235,8 +257,8 @@ mod tests {
             let exact = model.sigma0(*theta_rad).ln();
             assert!((table.at(place) - exact).abs() < 1e-12, "{theta_rad}");
         }
-        let many: Vec<f64> = (0..=INTERVALS).map(|i| i as f64 * 1e-3).collect();
-        assert!(Angles::exact(&many).is_none());
+        let many: Vec<Aspect> = (0..=INTERVALS).map(|i| Aspect::retro(i as f64 * 1e-3)).collect();
+        assert_eq!(Angles::of(&many).0.aspects, Angles::knots().aspects);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::aspect::Aspect;
 use super::error::{MaterialError, value};
 use crate::brdf::Tabulated;
 use crate::formats::words::significant;
@@ -247,6 +248,15 @@ impl Observation {
 
     /// Whether source and receiver were in the same direction.
     pub fn is_retro(&self) -> bool {
-        self.theta_i_rad == self.theta_r_rad && self.delta_phi_rad == 0.0
+        self.aspect().is_retro()
+    }
+
+    /// From where it was lit and seen.
+    pub fn aspect(&self) -> Aspect {
+        Aspect {
+            theta_i_rad: self.theta_i_rad,
+            theta_r_rad: self.theta_r_rad,
+            delta_phi_rad: self.delta_phi_rad,
+        }
     }
 }

@@ -3,6 +3,7 @@
 //! Inside are SI units, linear σ⁰ and radians. [`mod@file`] reads and writes the form people edit;
 //! [`builtin`] holds the catalogue that comes with the program.
 
+mod aspect;
 mod bidirectional;
 pub mod builtin;
 mod check;
@@ -23,6 +24,7 @@ mod slug;
 mod status;
 mod texts;
 
+pub use aspect::Aspect;
 pub use bidirectional::{is_turning, turns_the_line};
 pub use composition::{Layer, Permittivity, Roughness};
 pub use curve::{Censor, Curve, Illumination, Observation};

@@ -1,10 +1,12 @@
-//! A backscatter curve: one observation per chirp that hit, or should have hit, a material.
+//! A curve: one observation per chirp that hit, or should have hit, a material, or per pair of directions of an
+//! instrument that lights and sees a sample from two.
 //!
 //! As CSV: `theta_deg,theta_sd_deg,power_dbm,sigma0_db,range_m,chirp,censored,xt_m,yt_m,footprint,beam_rad`.
 //! σ⁰ is that of equation (10), 4π·f·cos²θ. It belongs to the material once it is known with which form of the
 //! footprint powers became f (`footprint`) and how wide the beam was (`beam_rad`): these are the same in every row,
 //! and left out where they are not stated. A chirp that should have been detected and was not is a row with
-//! `censored` = 1: its power and its σ⁰ are those that it stayed below.
+//! `censored` = 1: its power and its σ⁰ are those that it stayed below. Where not every row is backscatter,
+//! `theta_r_deg` and `delta_phi_deg` say from where it was seen.
 
 use thiserror::Error;
 
@@ -12,6 +14,7 @@ use crate::formats::{ColumnNames, FormatError};
 use crate::material;
 use crate::material::file::{Points, points};
 use crate::material::{Censor, Illumination, Observation};
+use crate::measure::in_plane::{self, InPlane};
 use crate::units::{db_from_ratio, dbm_from_watts};
 
 /// Columns of a curve file, in order; those of its [`Illumination`] follow where they are stated.
@@ -27,7 +30,7 @@ pub const COLUMNS: [&str; 9] = [
     "yt_m",
 ];
 
-/// A backscatter curve: observations in any order, each with a σ⁰ or the limit that it stayed below.
+/// A curve: observations in any order, each with a σ⁰ or the limit that it stayed below.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Curve {
     /// One per chirp. Those that [`Curve::read`] and [`Curve::of_material`] give leave out nothing but
@@ -37,15 +40,9 @@ pub struct Curve {
     pub illumination: Illumination,
 }
 
-/// Why an observation does not belong in a backscatter curve.
+/// Why an observation does not belong in a curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum ObservationError {
-    /// Source and receiver were in different directions.
-    #[error("point {point} (from 1) is bistatic; only backscatter is fitted, so leave it out")]
-    Bistatic {
-        /// Its number from 1.
-        point: usize,
-    },
     /// The true value lies above a threshold.
     #[error(
         "point {point} (from 1) is above the instrument's range, which a fit does not use; leave it out"
@@ -75,7 +72,7 @@ impl Curve {
     /// A material's curve. What an observation leaves out is as in [`Curve::read`].
     ///
     /// # Errors
-    /// The first observation that is not in a backscatter curve.
+    /// The first observation that does not belong in a curve.
     pub fn of_material(curve: &material::Curve) -> Result<Curve, ObservationError> {
         let illumination = curve.illumination;
         let completed = curve.observations.iter().enumerate();
@@ -96,37 +93,25 @@ impl Curve {
         Ok(Curve::read_as(bytes, &ColumnNames::default())?.0)
     }
 
-    /// Reads a curve file ([`points`]), and what a person should know of it. Of a table in the plane of incidence only
-    /// backscatter is read. Without a column a row is uncensored, its angle exact, its range 0, its
-    /// power σ⁰ in watts, its chirp its number from 0.
+    /// Reads a curve file ([`points`], or a `.bsdf` of [`in_plane`]), and what a person should know of it. Without a column a
+    /// row is uncensored, its angle exact, its range 0, its power σ⁰ in watts, its chirp its number from 0.
     ///
     /// # Errors
-    /// The first cell that cannot be used, with its line and column, and rows that are not backscatter.
+    /// The first cell that cannot be used, with its line and column.
     pub fn read_as(bytes: &[u8], names: &ColumnNames) -> Result<(Curve, Vec<String>), FormatError> {
-        let Points { mut rows, illumination, in_plane, passed_over, notices } =
-            points(bytes, names)?;
-        let mut notices: Vec<String> = passed_over.into_iter().chain(notices).collect();
-        if in_plane {
-            let all = rows.len();
-            rows.retain(|(_, point)| point.is_retro());
-            if rows.is_empty() {
-                let problem = "no row is backscatter (theta_s_deg = -theta_i_deg)";
-                let way_out = "a table in the plane of incidence is for `matdb diagnose --curve`";
-                return Err(FormatError::at("the table", problem, way_out));
-            }
-            if rows.len() < all {
-                notices.push(format!(
-                    "{} of {all} rows are not backscatter and are left out",
-                    all - rows.len()
-                ));
-            }
+        if in_plane::is_bsdf(bytes) {
+            let values = in_plane::read_bsdf(bytes)?;
+            let points = values.iter().map(InPlane::observation).enumerate();
+            let observations = points.map(|(index, point)| filled(index, &point, false)).collect();
+            return Ok((Curve { observations, ..Curve::default() }, Vec::new()));
         }
+        let Points { rows, illumination, passed_over, notices, .. } = points(bytes, names)?;
+        let notices: Vec<String> = passed_over.into_iter().chain(notices).collect();
         let mut observations = Vec::new();
         for (index, (line, point)) in rows.iter().enumerate() {
             let completed = complete(index, point, illumination.only_detected);
             observations.push(completed.map_err(|error| {
                 let problem = match error {
-                    ObservationError::Bistatic { .. } => "the row is bistatic",
                     ObservationError::AboveRange { .. } => {
                         "the row is above the instrument's range"
                     }
@@ -151,6 +136,10 @@ impl Curve {
         if only_detected {
             names = format!(",threshold_db{names}");
         }
+        let has_aspects = self.observations.iter().any(|o| !o.is_retro());
+        if has_aspects {
+            names = format!(",theta_r_deg,delta_phi_deg{names}");
+        }
         let mut text = format!("{}{names}\n", COLUMNS.join(","));
         for (index, o) in self.observations.iter().enumerate() {
             let sigma0 = o.level_sigma0().unwrap_or(f64::NAN);
@@ -160,8 +149,13 @@ impl Curve {
             let limit = o.threshold_sigma0.filter(|_| only_detected);
             let limit =
                 limit.map_or(String::new(), |limit| format!(",{:.3}", db_from_ratio(limit)));
+            let aspect = if has_aspects {
+                format!(",{:.4},{:.4}", o.theta_r_rad.to_degrees(), o.delta_phi_rad.to_degrees())
+            } else {
+                String::new()
+            };
             text += &format!(
-                "{:.4},{:.4},{:.3},{:.3},{:.5},{},{},{xt_m},{yt_m}{limit}{lit}\n",
+                "{:.4},{:.4},{:.3},{:.3},{:.5},{},{},{xt_m},{yt_m}{aspect}{limit}{lit}\n",
                 o.theta_i_rad.to_degrees(),
                 o.theta_sd_rad.unwrap_or(0.0).to_degrees(),
                 dbm_from_watts(o.power_w.unwrap_or(sigma0)),
@@ -180,15 +174,12 @@ impl Curve {
     }
 }
 
-/// σ⁰, or its limit, of an observation that belongs in a backscatter curve; `index` from 0.
+/// σ⁰, or its limit, of an observation that belongs in a curve; `index` from 0.
 ///
 /// # Errors
 /// Why the observation does not belong in one.
-pub(crate) fn backscatter_level(index: usize, o: &Observation) -> Result<f64, ObservationError> {
+pub(crate) fn level_sigma0(index: usize, o: &Observation) -> Result<f64, ObservationError> {
     let point = index + 1;
-    if !o.is_retro() {
-        return Err(ObservationError::Bistatic { point });
-    }
     if o.censor == Censor::Right {
         return Err(ObservationError::AboveRange { point });
     }
@@ -201,20 +192,24 @@ fn complete(
     o: &Observation,
     only_detected: bool,
 ) -> Result<Observation, ObservationError> {
-    let sigma0 = backscatter_level(index, o)?;
-    let threshold_sigma0 = o.threshold_sigma0.filter(|_| only_detected || o.is_censored());
-    if only_detected && threshold_sigma0.is_none() {
+    level_sigma0(index, o)?;
+    let completed = filled(index, o, only_detected);
+    if only_detected && completed.threshold_sigma0.is_none() {
         return Err(ObservationError::NoThreshold { point: index + 1 });
     }
-    Ok(Observation {
-        threshold_sigma0,
+    Ok(completed)
+}
+
+/// An observation that has a level, with those defaults.
+fn filled(index: usize, o: &Observation, only_detected: bool) -> Observation {
+    Observation {
+        threshold_sigma0: o.threshold_sigma0.filter(|_| only_detected || o.is_censored()),
         theta_sd_rad: o.theta_sd_rad.or(Some(0.0)),
-        power_w: o.power_w.or(Some(sigma0)),
+        power_w: o.power_w.or(o.level_sigma0()),
         range_m: o.range_m.or(Some(0.0)),
         chirp: o.chirp.or(Some(index as u32)),
-        target_m: o.target_m,
-        ..Observation::of_level(o.theta_i_rad, sigma0, o.is_censored())
-    })
+        ..*o
+    }
 }
 
 #[cfg(test)]
@@ -254,14 +249,21 @@ mod tests {
             [false, true]
         );
         assert!((curve.observations[1].threshold_sigma0.unwrap() - 1e-3).abs() < 1e-15);
-        for (row, said) in
-            [("10,-3,,,11,0", "bistatic"), ("10,,right,-3,,", "above the instrument")]
-        {
-            let text = format!(
-                "theta_deg,sigma0_db,censor,threshold_db,theta_r_deg,delta_phi_deg\n{row}\n"
-            );
-            let error = Curve::read(text.as_bytes()).unwrap_err().to_string();
-            assert!(error.contains(said) && error.contains("line 2"), "{error}");
+        let text = b"theta_deg,sigma0_db,censor,threshold_db\n10,,right,-3\n";
+        let error = Curve::read(text).unwrap_err().to_string();
+        assert!(error.contains("above the instrument") && error.contains("line 2"), "{error}");
+    }
+
+    #[test]
+    fn a_table_of_two_directions_survives_its_file() {
+        let table = b"theta_i_deg,theta_s_deg,brdf_per_sr\n30,-30,0.1\n30,40,0.3\n30,0,0.2\n";
+        let curve = Curve::read(table).unwrap();
+        let aspects: Vec<bool> = curve.observations.iter().map(Observation::is_retro).collect();
+        assert_eq!(aspects, [true, false, false]);
+        let again = Curve::read(&curve.write()).unwrap();
+        for (a, b) in curve.observations.iter().zip(&again.observations) {
+            assert!((a.aspect().half_angle_rad() - b.aspect().half_angle_rad()).abs() < 1e-5);
+            assert!((a.sigma0.unwrap() / b.sigma0.unwrap()).ln().abs() < 2e-4);
         }
     }
 
@@ -283,9 +285,6 @@ mod tests {
         };
         assert_eq!((kept[1].sigma0, kept[1].level_sigma0()), (None, Some(1e-3)));
         assert_eq!(of(kept.clone()), Ok(curve.clone()));
-        let bistatic = Observation { delta_phi_rad: 1.0, ..kept[0] };
-        let refused = of(vec![kept[0], bistatic]);
-        assert_eq!(refused, Err(ObservationError::Bistatic { point: 2 }));
         let above = Observation { censor: Censor::Right, ..kept[1] };
         let refused = of(vec![above]);
         assert_eq!(refused, Err(ObservationError::AboveRange { point: 1 }));

@@ -9,8 +9,11 @@
 //! Also read are the isotropic tables of optical design programs (`.bsdf`), whose angles are counted from
 //! the mirror direction: azimuth 0 leads towards the normal and past it, 180° away from it.
 
+use std::f64::consts::PI;
+
 use crate::formats::csv::{Names, Table};
 use crate::formats::{ColumnNames, FormatError};
+use crate::material::Observation;
 
 /// One measured value.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,6 +69,24 @@ pub fn read_table(
         notices.push(format!("{below} of {all} values are not above their blank and are left out"));
     }
     Ok((found, notices))
+}
+
+impl InPlane {
+    /// The value as a point of a curve.
+    pub fn observation(&self) -> Observation {
+        let place = Observation {
+            theta_r_rad: self.theta_s_rad.abs(),
+            // Back where the light came from, or on the other side of the normal.
+            delta_phi_rad: if self.theta_s_rad > 0.0 { PI } else { 0.0 },
+            ..Observation::backscatter(self.theta_i_rad, Some(1.0), None)
+        };
+        Observation { sigma0: Some(self.f_per_sr * place.aspect().sigma0_per_f()), ..place }
+    }
+}
+
+/// Whether the bytes are a `.bsdf` table, by the line that its values follow.
+pub fn is_bsdf(bytes: &[u8]) -> bool {
+    bytes.split(|byte| *byte == b'\n').any(|line| line.trim_ascii() == b"DataBegin")
 }
 
 /// Whether the bytes are a table of bistatic values, by its header.

@@ -21,6 +21,7 @@ mod neighbours;
 mod picture;
 mod prediction;
 mod radar;
+mod receiver_plot;
 mod residuals;
 mod scan;
 mod search;
@@ -49,6 +50,7 @@ pub use neighbours::{Neighbour, NeighbourReport, NeighbourSearch};
 pub use picture::Picture;
 pub use prediction::{PredictedLevel, Prediction, angles_deg};
 pub use radar::RadarReport;
+pub use receiver_plot::{receiver_layers, receiver_plot};
 pub use scan::{
     BeatShape, Counts, PowerRange, ReceiverRecord, RegionRecord, RenderFiles, RenderProgress,
     RenderRequest, RenderStage, ScanRecord,

@@ -107,7 +107,7 @@ impl NeighbourSearch {
     /// `limit`.
     ///
     /// # Errors
-    /// A curve without backscatter that was detected; a database that cannot be read.
+    /// A curve of which nothing was detected; a database that cannot be read.
     pub fn run(
         &self,
         store: Option<&Store>,
@@ -117,8 +117,7 @@ impl NeighbourSearch {
     ) -> Result<NeighbourReport, Error> {
         let Some(probe) = Probe::new(&self.observations) else {
             return Err(Error::usage(
-                "the curve has no backscatter that was detected, or a point above the \
-                          instrument's range",
+                "nothing of the curve was detected, or a point lies above the instrument's range",
                 "give a curve with detections below that range",
             ));
         };

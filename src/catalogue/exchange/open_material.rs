@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 
 use super::error::ExchangeError;
 use super::export_files::Export;
-use super::subject::{Subject, one_line, sigma0_per_f};
+use super::subject::{Subject, one_line};
 use crate::brdf::{Brdf, Scattering};
 use crate::frames::Direction;
 use crate::material::SourceKind;
@@ -208,7 +208,13 @@ impl Table {
             let azimuth_rad = o.delta_phi_rad.rem_euclid(TAU).min(LARGEST_AZIMUTH_RAD);
             let [i_rad, r_rad] =
                 [o.theta_i_rad, o.theta_r_rad].map(|rad| rad.min(LARGEST_ZENITH_RAD));
-            rows.push([wavelength_m, i_rad, r_rad, azimuth_rad, sigma0 / sigma0_per_f(o)]);
+            rows.push([
+                wavelength_m,
+                i_rad,
+                r_rad,
+                azimuth_rad,
+                sigma0 / o.aspect().sigma0_per_f(),
+            ]);
         }
         rows.sort_by(|a, b| {
             let columns = a.iter().zip(b).map(|(x, y)| x.total_cmp(y));

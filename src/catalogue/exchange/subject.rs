@@ -2,7 +2,6 @@
 //! file holds.
 
 use std::borrow::Cow;
-use std::f64::consts::PI;
 
 use crate::brdf::{Brdf, Scattering};
 use crate::material::{
@@ -187,11 +186,6 @@ impl Points<'_> {
     pub fn wavelength_m(&self) -> f64 {
         SPEED_OF_LIGHT_M_PER_S / self.frequency_hz
     }
-}
-
-/// 4π·cos θ_i·cos θ_r, which turns f in 1/sr into σ⁰.
-pub(super) fn sigma0_per_f(observation: &Observation) -> f64 {
-    4.0 * PI * observation.theta_i_rad.cos() * observation.theta_r_rad.cos()
 }
 
 /// The text with blanks for characters that end a line or reverse its direction, so that it stays within a comment.

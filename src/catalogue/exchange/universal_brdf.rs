@@ -17,7 +17,7 @@ use serde_json::{Map, Value, json};
 use super::error::ExchangeError;
 use super::export_files::Export;
 use super::plain_csv::describe;
-use super::subject::{Points, Subject, cited, one_line, sigma0_per_f};
+use super::subject::{Points, Subject, cited, one_line};
 use crate::material::{Censor, Observation, SourceKind};
 
 const SCHEMA: &str = "https://raw.githubusercontent.com/BiRD-project/BiRD_view/master/BRDF_JSON_schema/brdf_json_schema_v1.0.json";
@@ -159,14 +159,14 @@ fn column(points: &Points, value: impl Fn(&Observation) -> Value) -> Vec<Value> 
 /// f of a point, 1/sr: the limit where it is above the instrument's range, 0 where it is below the threshold.
 fn value_per_sr(o: &Observation) -> f64 {
     match (o.sigma0, o.censor) {
-        (Some(sigma0), _) => sigma0 / sigma0_per_f(o),
+        (Some(sigma0), _) => sigma0 / o.aspect().sigma0_per_f(),
         (None, Censor::Right) => threshold_per_sr(o).unwrap_or(0.0),
         (None, _) => 0.0,
     }
 }
 
 fn threshold_per_sr(o: &Observation) -> Option<f64> {
-    o.threshold_sigma0.map(|threshold| threshold / sigma0_per_f(o))
+    o.threshold_sigma0.map(|threshold| threshold / o.aspect().sigma0_per_f())
 }
 
 fn phi_deg(o: &Observation) -> f64 {

@@ -3,8 +3,6 @@
 //! One wavelength and one state of polarisation are read. Lost: uncertainties, instrumentation,
 //! sample and environment of files that matdb did not write; postal addresses of all.
 
-use std::f64::consts::PI;
-
 use serde_json::Value;
 
 use super::detail::Detail;
@@ -13,7 +11,9 @@ use super::error::ExchangeError;
 use super::plain_csv::{RADAR, SingleCurve, of_curve};
 use super::universal_brdf::{CENSOR, OURS, THRESHOLD};
 use crate::formats::FormatError;
-use crate::material::{Censor, Illumination, Instrument, Material, Observation, SourceKind};
+use crate::material::{
+    Aspect, Censor, Illumination, Instrument, Material, Observation, SourceKind,
+};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// Makes a material of a file.
@@ -119,7 +119,9 @@ fn observations(data: &Value) -> Result<Vec<Observation>, FormatError> {
     let mut observations = Vec::with_capacity(brdf.len());
     for (row, (&value, limit)) in brdf.iter().zip(censors).enumerate() {
         let (theta_i_rad, theta_r_rad) = (theta_i[row], theta_r[row]);
-        let per_f = 4.0 * PI * theta_i_rad.cos() * theta_r_rad.cos();
+        let delta_phi_rad = phi_r[row] - phi_i[row];
+        let aspect = Aspect { theta_i_rad, theta_r_rad, delta_phi_rad };
+        let per_f = aspect.sigma0_per_f();
         let sigma0 = per_f * value;
         let is_level = sigma0 > 0.0 && sigma0.is_finite();
         if limit.censor == Censor::None && !is_level {
@@ -131,7 +133,7 @@ fn observations(data: &Value) -> Result<Vec<Observation>, FormatError> {
         let threshold = limit.threshold.map(|threshold| per_f * threshold);
         observations.push(Observation {
             theta_r_rad,
-            delta_phi_rad: phi_r[row] - phi_i[row],
+            delta_phi_rad,
             censor: limit.censor,
             ..Observation::backscatter(theta_i_rad, level, threshold)
         });

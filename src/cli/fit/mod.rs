@@ -14,15 +14,18 @@ use super::plot::write_plot;
 use crate::adopt::{FitMethod, FitOutcome, FitRequest, FitStorage, FitSubject, StoredFit};
 use crate::error::Error;
 use crate::fit::{FitResult, model_names};
-use crate::material::{Fit, SourceKind};
+use crate::material::{Fit, Observation, SourceKind};
 use crate::radar::Radar;
-use crate::report::{FigureFormat, curve_points, fit_layers, incidence_plot};
+use crate::report::{
+    FigureFormat, curve_points, fit_layers, incidence_plot, receiver_layers, receiver_plot,
+};
 use crate::setup::{Database, unmet_conditions, unmet_sentence};
 use crate::units::watts_from_dbm;
 
 const EXAMPLES_AND_METHODS: &str = "Examples:
   matdb fit curve.csv                 the paper's five parameters, censored likelihood
   matdb fit curve.csv --model mixture-ggx -o fit.svg
+  matdb fit plane.csv --model mixture-ggx   source and receiver in two directions
   matdb fit curve.csv --method tls-tail --alpha 3
   matdb fit cotton --fix diffuse.alpha=4 --save
   matdb fit my-paint --save           a fit of its longest curve, into my-paint
@@ -152,7 +155,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         console.notice(&unmet_sentence(&condition));
     }
     let files = match &args.output {
-        Some(path) if result.converged => draw(path, &subject, &fit)?,
+        Some(path) if result.converged => draw(path, &subject, &fit, console)?,
         _ => Vec::new(),
     };
     let saved = stored.as_ref();
@@ -198,9 +201,26 @@ fn held(text: &str) -> Result<(String, f64), Error> {
     Ok((path.to_owned(), value))
 }
 
-fn draw(path: &Path, subject: &FitSubject, fit: &Fit) -> Result<Vec<String>, Error> {
-    let points = curve_points(&subject.curve_name, &subject.curve.observations);
-    let series = fit_layers(std::slice::from_ref(fit), points);
-    let subtitle = format!("{}, with its 95 % band", fit.name);
-    write_plot(path, &incidence_plot(&subject.label, &subtitle, series))
+fn draw(
+    path: &Path,
+    subject: &FitSubject,
+    fit: &Fit,
+    console: &Console,
+) -> Result<Vec<String>, Error> {
+    let rows = &subject.curve.observations;
+    let file = subject.file.as_ref().and_then(|file| file.file_name());
+    let title = file.map_or(subject.label.clone(), |file| file.to_string_lossy().into_owned());
+    if rows.iter().all(Observation::is_retro) {
+        let points = curve_points(&subject.curve_name, rows);
+        let series = fit_layers(std::slice::from_ref(fit), points);
+        let subtitle = format!("{}, with its 95 % band", fit.name);
+        return write_plot(path, &incidence_plot(&title, &subtitle, series));
+    }
+    let series = receiver_layers(rows, fit);
+    if series.is_empty() {
+        console.notice("nothing is drawn: no row lies in the plane of incidence");
+        return Ok(Vec::new());
+    }
+    let subtitle = format!("{} in dashes", fit.name);
+    write_plot(path, &receiver_plot(&title, &subtitle, series))
 }

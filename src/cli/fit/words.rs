@@ -15,12 +15,17 @@ pub(super) fn result(
 ) -> String {
     let rows = subject.curve.observations.len();
     let censored = rows - subject.curve.detected().count();
+    let apart = subject.curve.observations.iter().filter(|row| !row.is_retro()).count();
     let mut text = format!(
-        "{}: {} rows, {} of them below the threshold\n",
+        "{}: {} rows, {} of them below the threshold",
         subject.label,
         grouped(rows),
         grouped(censored)
     );
+    if apart > 0 {
+        text += &format!(", {} of them with source and receiver in two directions", grouped(apart));
+    }
+    text.push('\n');
     let lit = subject.curve.illumination;
     let lobes = fit.lobes_words().map_or(String::new(), |words| format!("; {words}"));
     text += &format!("{}; {}{lobes}\n", lit.footprint_words(), lit.beam_words());

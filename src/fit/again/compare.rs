@@ -1,12 +1,12 @@
 //! Compares a stored fit with a new one: the model that is rendered, the numbers and their uncertainty, and the
 //! sentences. The tolerances follow from the new fit alone.
 
-use crate::brdf::{Brdf, Scattering, ThroughBeam};
+use crate::brdf::{Brdf, ThroughBeam};
 use crate::fit::coordinates::{DIFFUSE_LEVEL, LOOKS, SPECULAR_LEVEL};
 use crate::fit::interval::DEVIATE_95;
 use crate::fit::result::FitResult;
 use crate::fit::verdict::Finding;
-use crate::material::{self, CrossValidation, Estimate, FitReport, Goodness};
+use crate::material::{self, Aspect, CrossValidation, Estimate, FitReport, Goodness, Observation};
 use crate::measure::curve::Curve;
 
 /// How far ln likelihoods, or half sums of squares, of two searches for one optimum may differ: where
@@ -127,31 +127,38 @@ fn value(model: &Brdf, name: &str) -> Option<f64> {
     }
 }
 
-/// Compares σ⁰ of the two models at the angles of the detections: numbers that the data determine only together
-/// must still give the same curve.
+/// Compares σ⁰ of the two models where there are detections: numbers that the data determine only together must still
+/// give the same curve.
 fn level(stored: &material::Fit, found: &FitResult, curve: &Curve) -> Option<String> {
     const NEPER_PER_DB: f64 = std::f64::consts::LN_10 / 10.0;
-    let (mut low_rad, mut high_rad) = (f64::INFINITY, 0.0f64);
-    for row in curve.detected() {
-        low_rad = low_rad.min(row.theta_i_rad);
-        high_rad = high_rad.max(row.theta_i_rad);
-    }
     // As many directions as numbers, each as far off as a number may be.
     let directions = (found.estimates.len() as f64).sqrt();
     let seen = ThroughBeam { law: &stored.model, beam_rad: stored.beam_rad().unwrap_or(0.0) };
-    for angle in 0..=ANGLES {
-        let theta_rad = low_rad + (high_rad - low_rad) * f64::from(angle) / f64::from(ANGLES);
-        let band = found.band(theta_rad);
+    for aspect in aspects(curve) {
+        let band = found.band_of(aspect);
         let sd = (band.high / band.mid).ln() / DEVIATE_95;
         let step = SAME_NUMBER_SD * directions * sd + SAME_LEVEL_DB * NEPER_PER_DB;
-        if !is_near(seen.sigma0(theta_rad).ln(), band.mid.ln(), step) {
-            let theta_deg = theta_rad.to_degrees();
+        if !is_near(aspect.sigma0(&seen).ln(), band.mid.ln(), step) {
+            let theta_deg = aspect.theta_i_rad.to_degrees();
             return Some(format!(
                 "its model has another level at {theta_deg:.1}° than that of a new fit"
             ));
         }
     }
     None
+}
+
+/// Aspects evenly over the angles of the detections; some of the detections' own where not all are backscatter.
+fn aspects(curve: &Curve) -> Vec<Aspect> {
+    let seen: Vec<Aspect> = curve.detected().map(Observation::aspect).collect();
+    if seen.iter().any(|aspect| !aspect.is_retro()) {
+        return seen.iter().copied().step_by(seen.len().div_ceil(ANGLES as usize)).collect();
+    }
+    let angles = || seen.iter().map(|aspect| aspect.theta_i_rad);
+    let (low_rad, high_rad) =
+        (angles().fold(f64::INFINITY, f64::min), angles().fold(0.0, f64::max));
+    let share = |angle| f64::from(angle) / f64::from(ANGLES);
+    (0..=ANGLES).map(|angle| Aspect::retro(low_rad + (high_rad - low_rad) * share(angle))).collect()
 }
 
 /// Both covariances: of all numbers found, and of the parameters.

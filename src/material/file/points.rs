@@ -157,15 +157,10 @@ impl Form {
             }
             Form::InPlane => {
                 let blank = table.number_within(row, "blank_per_sr", BRDFS_PER_SR)?;
-                Ok(blank.map(|f_per_sr| f_per_sr * sigma0_per_f(point)))
+                Ok(blank.map(|f_per_sr| f_per_sr * point.aspect().sigma0_per_f()))
             }
         }
     }
-}
-
-/// σ⁰ over f: 4π·cos θ_i·cos θ_r.
-fn sigma0_per_f(point: &Observation) -> f64 {
-    4.0 * PI * point.theta_i_rad.cos() * point.theta_r_rad.cos()
 }
 
 /// The only one of some columns.
@@ -207,7 +202,11 @@ fn in_plane_point(table: &Table, row: usize) -> Result<Observation, FormatError>
         delta_phi_rad: if theta_s_deg > 0.0 { PI } else { 0.0 },
         ..Observation::backscatter(theta_i_deg.to_radians(), None, None)
     };
-    Ok(Observation { sigma0: Some(f_per_sr * sigma0_per_f(&place)), censor: Censor::None, ..place })
+    Ok(Observation {
+        sigma0: Some(f_per_sr * place.aspect().sigma0_per_f()),
+        censor: Censor::None,
+        ..place
+    })
 }
 
 /// Refuses a table with two values of a column that belongs to the curve: that of a published page may have several

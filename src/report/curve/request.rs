@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::brdf::Brdf;
 use crate::diagnose::curve::{CurveDiagnosis, CurveReport, Points, Term, base_law};
 use crate::error::Error;
-use crate::formats::ColumnNames;
+use crate::formats::{ColumnNames, FormatError};
 use crate::measure::{Curve, in_plane};
 
 /// What to diagnose.
@@ -44,7 +44,8 @@ impl CurveRequest<'_> {
     }
 
     fn points(&self, bytes: &[u8]) -> Result<(Points, Vec<String>), Error> {
-        let is_bsdf = self.path.extension().is_some_and(|end| end.eq_ignore_ascii_case("bsdf"));
+        let is_named_so = self.path.extension().is_some_and(|end| end.eq_ignore_ascii_case("bsdf"));
+        let is_bsdf = is_named_so || in_plane::is_bsdf(bytes);
         let noise_db = self.noise_db;
         let points = if is_bsdf {
             in_plane::read_bsdf(bytes).map(|table| (Points::in_plane(&table, noise_db), Vec::new()))
@@ -52,9 +53,22 @@ impl CurveRequest<'_> {
             in_plane::read_table(bytes, self.columns)
                 .map(|(table, notices)| (Points::in_plane(&table, noise_db), notices))
         } else {
-            Curve::read_as(bytes, self.columns)
-                .map(|(curve, notices)| (Points::backscatter(&curve, noise_db), notices))
+            Curve::read_as(bytes, self.columns).and_then(|(curve, notices)| {
+                refuse_other_directions(&curve)?;
+                Ok((Points::backscatter(&curve, noise_db), notices))
+            })
         };
         points.map_err(|error| Error::CurveFile { file: self.path.to_owned(), error })
     }
+}
+
+/// Refuses a point that was lit and seen from two directions in a table of backscatter.
+fn refuse_other_directions(curve: &Curve) -> Result<(), FormatError> {
+    let Some(place) = curve.observations.iter().position(|row| !row.is_retro()) else {
+        return Ok(());
+    };
+    let place = format!("point {} (from 1)", place + 1);
+    let way_out =
+        "give a table in the plane of incidence: theta_i_deg, theta_s_deg and brdf_per_sr";
+    Err(FormatError::at(place, "source and receiver were in two directions", way_out))
 }
