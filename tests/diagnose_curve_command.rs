@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::support::{entries, matdb, refused};
 use matdb::brdf::Scattering;
 use matdb::diagnose::curve::{Points, base_law, term};
-use matdb::measure::in_plane::InPlane;
+use matdb::material::file::in_plane::InPlane;
 use serde_json::Value;
 
 const FILES: [&str; 5] = ["curve.png", "curve.svg", "report.html", "report.json", "residuals.csv"];

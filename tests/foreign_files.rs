@@ -310,6 +310,13 @@ fn a_foreign_curve_is_fitted_compared_and_stored() {
     assert!(said(at, add).contains("added plane"));
     let shown = said(at, "show plane --json");
     assert!(shown.contains("theta_r_rad"), "{shown}");
+    // Levels of an unknown unit have a shape alone.
+    let relative = "theta_deg,sigma0_db,relative\n5,20,1\n10,19,1\n20,15,1\n30,9,1\n";
+    fs::write(at.join("relative.csv"), relative).unwrap();
+    let error = refused(at, "near --curve relative.csv --measured-at 300");
+    assert!(error.contains("rank by shape (--shape)"), "{error}");
+    let near = said(at, "near --curve relative.csv --shape --measured-at 300");
+    assert!(near.contains("ranked by shape, its level left open"), "{near}");
     // What is stored is found again by its own fit.
     let saved = said(at, "fit plane --model lambert --save");
     assert!(saved.contains("stored as fit"), "{saved}");

@@ -5,7 +5,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use matdb::formats::ColumnNames;
-use matdb::measure::in_plane::{read_bsdf, read_table};
+use matdb::material::file::in_plane::{read_bsdf, read_table};
 
 fuzz_target!(|bytes: &[u8]| {
     let table = read_table(bytes, &ColumnNames::default()).map(|(table, _)| table);

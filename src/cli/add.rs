@@ -37,7 +37,7 @@ pub(super) struct Args {
     /// Every built-in material
     #[arg(long, group = "what")]
     all: bool,
-    /// A material.toml, or a folder with one or with subfolders that have one; or a curve (.csv), a
+    /// A material.toml, or a folder with one or with subfolders that have one; or a curve (.csv, .bsdf), a
     /// universal BRDF (.brdf, .json) or a page of refractiveindex.info's database (.yml)
     #[arg(long, value_name = "FILE|DIR", group = "what")]
     from: Vec<PathBuf>,

@@ -14,7 +14,6 @@ use crate::formats::{ColumnNames, FormatError};
 use crate::material;
 use crate::material::file::{Points, points};
 use crate::material::{Censor, Illumination, Observation};
-use crate::measure::in_plane::{self, InPlane};
 use crate::units::{db_from_ratio, dbm_from_watts};
 
 /// Columns of a curve file, in order; those of its [`Illumination`] follow where they are stated.
@@ -93,18 +92,12 @@ impl Curve {
         Ok(Curve::read_as(bytes, &ColumnNames::default())?.0)
     }
 
-    /// Reads a curve file ([`points`], or a `.bsdf` of [`in_plane`]), and what a person should know of it. Without a column a
-    /// row is uncensored, its angle exact, its range 0, its power σ⁰ in watts, its chirp its number from 0.
+    /// Reads a curve file ([`points`]), and what a person should know of it. Without a column a row is uncensored, its angle
+    /// exact, its range 0, its power σ⁰ in watts, its chirp its number from 0.
     ///
     /// # Errors
     /// The first cell that cannot be used, with its line and column.
     pub fn read_as(bytes: &[u8], names: &ColumnNames) -> Result<(Curve, Vec<String>), FormatError> {
-        if in_plane::is_bsdf(bytes) {
-            let values = in_plane::read_bsdf(bytes)?;
-            let points = values.iter().map(InPlane::observation).enumerate();
-            let observations = points.map(|(index, point)| filled(index, &point, false)).collect();
-            return Ok((Curve { observations, ..Curve::default() }, Vec::new()));
-        }
         let Points { rows, illumination, passed_over, notices, .. } = points(bytes, names)?;
         let notices: Vec<String> = passed_over.into_iter().chain(notices).collect();
         let mut observations = Vec::new();
@@ -192,24 +185,19 @@ fn complete(
     o: &Observation,
     only_detected: bool,
 ) -> Result<Observation, ObservationError> {
-    level_sigma0(index, o)?;
-    let completed = filled(index, o, only_detected);
-    if only_detected && completed.threshold_sigma0.is_none() {
+    let sigma0 = level_sigma0(index, o)?;
+    let threshold_sigma0 = o.threshold_sigma0.filter(|_| only_detected || o.is_censored());
+    if only_detected && threshold_sigma0.is_none() {
         return Err(ObservationError::NoThreshold { point: index + 1 });
     }
-    Ok(completed)
-}
-
-/// An observation that has a level, with those defaults.
-fn filled(index: usize, o: &Observation, only_detected: bool) -> Observation {
-    Observation {
-        threshold_sigma0: o.threshold_sigma0.filter(|_| only_detected || o.is_censored()),
+    Ok(Observation {
+        threshold_sigma0,
         theta_sd_rad: o.theta_sd_rad.or(Some(0.0)),
-        power_w: o.power_w.or(o.level_sigma0()),
+        power_w: o.power_w.or(Some(sigma0)),
         range_m: o.range_m.or(Some(0.0)),
         chirp: o.chirp.or(Some(index as u32)),
         ..*o
-    }
+    })
 }
 
 #[cfg(test)]

@@ -13,7 +13,6 @@ pub mod curve;
 mod error;
 pub mod freedom;
 pub mod icp;
-pub mod in_plane;
 pub mod incidence;
 mod locate;
 pub mod nearest;

@@ -78,7 +78,7 @@ pub fn export(subject: &Subject, format: Format, name: &str) -> Result<Export, E
 pub enum Foreign {
     /// `.yml`, `.yaml`: a page of refractiveindex.info's database.
     OpticalConstants,
-    /// `.csv`: a curve.
+    /// `.csv`, `.bsdf`: a curve.
     Csv,
     /// `.brdf`, `.json`: universal BRDF.
     UniversalBrdf,
@@ -89,7 +89,7 @@ impl Foreign {
     pub fn from_extension(extension: &str) -> Option<Foreign> {
         match extension.to_ascii_lowercase().as_str() {
             "yml" | "yaml" => Some(Foreign::OpticalConstants),
-            "csv" => Some(Foreign::Csv),
+            "csv" | "bsdf" => Some(Foreign::Csv),
             "brdf" | "json" => Some(Foreign::UniversalBrdf),
             _ => None,
         }

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::frames::{Direction, Surface};
 use crate::measure::Curve;
-use crate::measure::in_plane::InPlane;
+use crate::material::file::in_plane::InPlane;
 use crate::units::{db_from_ratio, ratio_from_db};
 
 /// What a curve is measured over.

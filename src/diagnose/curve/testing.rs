@@ -2,7 +2,7 @@
 
 use super::points::{Kind, Point, Points};
 use crate::brdf::{Brdf, Scattering};
-use crate::measure::in_plane::InPlane;
+use crate::material::file::in_plane::InPlane;
 use crate::radar::random::{Key, Purpose};
 use crate::units::{db_from_ratio, ratio_from_db};
 

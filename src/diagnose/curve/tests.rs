@@ -7,7 +7,7 @@ use super::testing::{curve_of, noisy};
 use super::*;
 use crate::brdf::{Brdf, Scattering};
 use crate::measure::Curve;
-use crate::measure::in_plane::InPlane;
+use crate::material::file::in_plane::InPlane;
 use crate::units::{db_from_ratio, ratio_from_db};
 
 const INCIDENCES_DEG: [f64; 4] = [10.0, 30.0, 50.0, 70.0];

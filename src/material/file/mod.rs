@@ -4,6 +4,7 @@
 //! last two may be left out, and others may be added ([`points`]).
 
 mod composition;
+pub mod in_plane;
 mod points;
 mod provenance;
 mod temperature;

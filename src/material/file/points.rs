@@ -3,10 +3,10 @@
 //! An angle is `theta_deg`, `grazing_deg` (from the surface), or `theta_signed_deg`, whose sign is left alone: one side
 //! of the normal is as good as the other. A level is `sigma0_db` or `sigma0`, a ratio. Both may instead be those of the
 //! plane of incidence: `theta_i_deg`, `theta_s_deg` (positive on the side of the mirror direction) and `brdf_per_sr`.
-//! A level that is not above its blank (`blank_db`, or `blank_per_sr`) counts as a limit at the blank.
+//! A level that is not above its blank (`blank_db`, or `blank_per_sr`) counts as a limit at the blank. A `.bsdf` is read as
+//! a table in the plane of incidence.
 
-use std::f64::consts::PI;
-
+use super::in_plane::{self, InPlane};
 use crate::formats::csv::{Names, Table};
 use crate::formats::{ColumnNames, FormatError};
 use crate::material::curve::{Censor, Illumination, Observation};
@@ -44,8 +44,6 @@ const OPTIONAL: [&str; 20] = [
 
 /// Angles that a surface can be seen under, degrees.
 const QUARTER_TURN_DEG: (f64, f64) = (0.0, 90.0);
-/// Grazing directions say nothing of a surface, degrees.
-const GRAZING_DEG: f64 = 89.9;
 /// Values of f that are no slip, 1/sr.
 const BRDFS_PER_SR: (f64, f64) = (1e-30, 1e30);
 /// Levels that are no slip, dB.
@@ -63,12 +61,10 @@ const BEAMS_RAD: (f64, f64) = (1e-6, std::f64::consts::FRAC_PI_2);
 /// The CSV of a curve.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Points {
-    /// Each point behind the number of its line.
+    /// Each point behind the number of its line, or of its value in a `.bsdf`.
     pub rows: Vec<(usize, Observation)>,
     /// How the target was lit and seen, as far as columns state it.
     pub illumination: Illumination,
-    /// Whether the table is one in the plane of incidence, of which few rows are backscatter.
-    pub in_plane: bool,
     /// A sentence on columns of which nothing is read.
     pub passed_over: Option<String>,
     /// What else a person should know of the file.
@@ -84,6 +80,14 @@ pub struct Points {
 /// # Errors
 /// The first cell that cannot be used, with its line and column; a table in which every level is below its blank.
 pub fn points(bytes: &[u8], names: &ColumnNames) -> Result<Points, FormatError> {
+    if in_plane::is_bsdf(bytes) {
+        let values = in_plane::read_bsdf(bytes)?;
+        let rows = values.iter().map(InPlane::observation).enumerate();
+        return Ok(Points {
+            rows: rows.map(|(n, row)| (n + 1, row)).collect(),
+            ..Points::default()
+        });
+    }
     let mut table = Table::parse(bytes, Names::InFirstLine)?;
     table.rename(names)?;
     table.lower_case();
@@ -113,8 +117,7 @@ pub fn points(bytes: &[u8], names: &ColumnNames) -> Result<Points, FormatError> 
         notices
             .push(format!("{below} of {all} levels are not above their blank and count as limits"));
     }
-    let in_plane = matches!(form, Form::InPlane);
-    Ok(Points { rows, illumination: illumination(&table)?, in_plane, passed_over, notices })
+    Ok(Points { rows, illumination: illumination(&table)?, passed_over, notices })
 }
 
 /// What the rows of a table hold.
@@ -140,7 +143,7 @@ impl Form {
     fn point(self, table: &Table, row: usize) -> Result<Observation, FormatError> {
         match self {
             Form::Backscatter { angle, level } => point(table, row, angle, level),
-            Form::InPlane => in_plane_point(table, row),
+            Form::InPlane => Ok(in_plane::read_row(table, row)?.observation()),
         }
     }
 
@@ -189,24 +192,6 @@ fn above_blank(point: Observation, blank_sigma0: Option<f64>) -> (Observation, b
         }
         _ => (point, false),
     }
-}
-
-/// A row in the plane of incidence.
-fn in_plane_point(table: &Table, row: usize) -> Result<Observation, FormatError> {
-    let theta_i_deg = table.required_within(row, "theta_i_deg", (0.0, GRAZING_DEG))?;
-    let theta_s_deg = table.required_within(row, "theta_s_deg", (-GRAZING_DEG, GRAZING_DEG))?;
-    let f_per_sr = table.required_within(row, "brdf_per_sr", BRDFS_PER_SR)?;
-    let place = Observation {
-        theta_r_rad: theta_s_deg.abs().to_radians(),
-        // Back where the light came from, or on the other side of the normal.
-        delta_phi_rad: if theta_s_deg > 0.0 { PI } else { 0.0 },
-        ..Observation::backscatter(theta_i_deg.to_radians(), None, None)
-    };
-    Ok(Observation {
-        sigma0: Some(f_per_sr * place.aspect().sigma0_per_f()),
-        censor: Censor::None,
-        ..place
-    })
 }
 
 /// Refuses a table with two values of a column that belongs to the curve: that of a published page may have several
@@ -378,6 +363,8 @@ fn stated(
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
 
     fn ours() -> ColumnNames {

@@ -6,7 +6,8 @@ use crate::brdf::Brdf;
 use crate::diagnose::curve::{CurveDiagnosis, CurveReport, Points, Term, base_law};
 use crate::error::Error;
 use crate::formats::{ColumnNames, FormatError};
-use crate::measure::{Curve, in_plane};
+use crate::material::file::in_plane;
+use crate::measure::Curve;
 
 /// What to diagnose.
 #[derive(Clone, Copy)]

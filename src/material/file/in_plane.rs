@@ -97,7 +97,7 @@ pub fn is_table(bytes: &[u8], names: &ColumnNames) -> bool {
     renamed && table.has("theta_s_deg")
 }
 
-fn read_row(table: &Table, row: usize) -> Result<InPlane, FormatError> {
+pub(super) fn read_row(table: &Table, row: usize) -> Result<InPlane, FormatError> {
     let sd_db = table.number_within(row, "sd_db", (1e-6, 100.0))?;
     let theta_i_deg = table.required_within(row, "theta_i_deg", (0.0, GRAZING_DEG))?;
     let theta_s_deg = table.required_within(row, "theta_s_deg", (-GRAZING_DEG, GRAZING_DEG))?;
