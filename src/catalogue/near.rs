@@ -8,7 +8,6 @@
 //! material respects, where the difference is 0; there must be some at which something was detected, so
 //! that silence makes nothing alike.
 
-use std::cmp::Ordering;
 use std::ops::RangeInclusive;
 
 use serde::Serialize;
@@ -263,8 +262,7 @@ fn detected(points: &[&Observation]) -> Vec<f64> {
 
 /// The points of each pair of directions.
 fn by_aspect(mut points: Vec<&Observation>) -> Vec<Vec<&Observation>> {
-    let angles = |o: &Observation| [o.theta_i_rad, o.theta_r_rad, o.delta_phi_rad];
-    points.sort_by(|a, b| angles(a).partial_cmp(&angles(b)).unwrap_or(Ordering::Equal));
+    points.sort_by(|a, b| a.aspect().in_order(&b.aspect()));
     points.chunk_by(|a, b| a.aspect() == b.aspect()).map(<[&Observation]>::to_vec).collect()
 }
 

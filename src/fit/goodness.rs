@@ -74,12 +74,34 @@ pub(crate) fn normal_share(z: f64) -> f64 {
     0.5 * erfc(-z / std::f64::consts::SQRT_2)
 }
 
+/// Correlation of the residuals z of detections with those of their neighbours by angle, which a right law leaves
+/// uncorrelated; 0 for fewer than three.
+pub(super) fn correlation_of_neighbours(
+    fit: &Fit,
+    coordinates: &Coordinates,
+    at: &DVector<f64>,
+    rows: &[Observation],
+) -> f64 {
+    let below = Likelihood::new(coordinates, rows, fit.noise_w.unwrap_or(0.0)).ln_below(at);
+    let rows = rows.iter().zip(below).filter(|(row, _)| !row.is_censored());
+    let mut residuals: Vec<(Aspect, f64)> =
+        rows.map(|(row, ln_below)| (row.aspect(), z_of(ln_below.exp()))).collect();
+    residuals.sort_by(|(a, _), (b, _)| a.in_order(b));
+    let z_mean = mean(residuals.iter().map(|(_, z)| *z));
+    let squares: f64 = residuals.iter().map(|(_, z)| (z - z_mean).powi(2)).sum();
+    let pairs = residuals.windows(2).map(|pair| (pair[0].1 - z_mean) * (pair[1].1 - z_mean));
+    let products: f64 = pairs.sum();
+    if residuals.len() < 3 || squares == 0.0 { 0.0 } else { products / squares }
+}
+
+/// Φ⁻¹(u), away from the infinite ends.
+fn z_of(share: f64) -> f64 {
+    -std::f64::consts::SQRT_2 * erfc_inv(2.0 * share.clamp(1e-15, 1.0 - 1e-15))
+}
+
 /// Sums up residuals in dB and probabilities u; `speckle_db` is the standard deviation that speckle alone leaves.
 fn goodness_of(residuals_db: &[f64], mut shares: Vec<f64>, speckle_db: Option<f64>) -> Goodness {
-    const SQRT_2: f64 = std::f64::consts::SQRT_2;
-    // z = Φ⁻¹(u), away from the infinite ends.
-    let z: Vec<f64> =
-        shares.iter().map(|u| -SQRT_2 * erfc_inv(2.0 * u.clamp(1e-15, 1.0 - 1e-15))).collect();
+    let z: Vec<f64> = shares.iter().map(|share| z_of(*share)).collect();
     let z_mean = mean(z.iter().copied());
     // Kolmogorov's distance of u from a uniform law.
     shares.sort_by(f64::total_cmp);

@@ -1,6 +1,7 @@
 //! The findings on a fit, from its rows, its numbers and their uncertainty.
 
 use super::coordinates::{DIFFUSE_LEVEL, LOOKS, SPECULAR_LEVEL};
+use super::goodness::correlation_of_neighbours;
 use super::interval::DEVIATE_95;
 use super::result::FitResult;
 use super::search::SearchResult;
@@ -16,6 +17,10 @@ use crate::measure::Curve;
 const CORRELATED: f64 = 0.95;
 /// Kolmogorov's distance times √rows that chance exceeds once in a hundred times.
 const KOLMOGOROV_1_PERCENT: f64 = 1.63;
+/// Deviation of a normal number that chance exceeds once in a thousand times, and detections of which the correlation of
+/// neighbours is normal enough for it.
+const NORMAL_1_IN_1000: f64 = 3.09;
+const LEAST_NEIGHBOURS: usize = 20;
 /// Detections for each fitted number below which the model is not tested, and in all.
 const ROWS_PER_NUMBER: usize = 3;
 const LEAST_ROWS: usize = 12;
@@ -65,6 +70,7 @@ pub(super) fn judge(result: &FitResult, found: &SearchResult, curve: &Curve) -> 
     {
         findings.push(Finding::MoreThanSpeckle { looks });
     }
+    findings.extend(judge_neighbours(result, rows));
     let limit = KOLMOGOROV_1_PERCENT / f64::from(result.goodness.rows.max(1)).sqrt();
     let ks_distance = result.goodness.ks_distance;
     if result.fit.method == Method::Censored && ks_distance > limit {
@@ -79,6 +85,18 @@ fn is_level_at_bound(finding: &Finding) -> bool {
         Finding::AtBound { name, .. } => [SPECULAR_LEVEL, DIFFUSE_LEVEL].contains(&name.as_str()),
         _ => false,
     }
+}
+
+/// That residuals of neighbouring angles are alike.
+fn judge_neighbours(result: &FitResult, rows: &[Observation]) -> Option<Finding> {
+    let FitResult { fit, coordinates, at, .. } = result;
+    let detected = rows.iter().filter(|row| !row.is_censored()).count();
+    if fit.method != Method::Censored || detected < LEAST_NEIGHBOURS {
+        return None;
+    }
+    let correlation = correlation_of_neighbours(fit, coordinates, at, rows);
+    let limit = NORMAL_1_IN_1000 / (detected as f64).sqrt();
+    (correlation > limit).then_some(Finding::NeighboursAlike { correlation, limit })
 }
 
 /// Which angles lack a detection, and which rows the method does not use.

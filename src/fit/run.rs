@@ -390,6 +390,16 @@ mod tests {
     }
 
     #[test]
+    fn a_law_of_another_form_leaves_neighbours_alike() {
+        let curve = plane(&mixture(0.2, 3.0, 0.05, 0.004), 1000.0);
+        let alike = |model: &str| {
+            let found = Fit::default().run(&crate::fit::model(model).unwrap(), &curve).unwrap();
+            found.verdict.iter().any(|f| matches!(f, Finding::NeighboursAlike { .. }))
+        };
+        assert!(alike("mixture-ggx") && !alike("mixture"));
+    }
+
+    #[test]
     fn what_two_directions_do_not_allow_is_refused() {
         let mut curve = plane(&start(), 100.0);
         let method = Method::Mse { split_rad: 0.1 };

@@ -5,7 +5,6 @@
 //! at θ = θ_end·sinh(βx)/sinh β, x uniform: dense at the specular peak, where the curve bends most.
 //! The curve is even in θ, which gives the knot below the first.
 
-use std::cmp::Ordering;
 use std::f64::consts::FRAC_PI_2;
 use std::sync::LazyLock;
 
@@ -49,14 +48,14 @@ impl Angles {
     /// more than there are knots.
     pub fn of(aspects: &[Aspect]) -> (Angles, Vec<Place>) {
         let mut different = aspects.to_vec();
-        different.sort_by(order);
+        different.sort_by(Aspect::in_order);
         different.dedup();
         if different.len() > INTERVALS && different.iter().all(|aspect| aspect.is_retro()) {
             let places = aspects.iter().map(|aspect| Place::new(aspect.theta_i_rad)).collect();
             return (Angles::knots().clone(), places);
         }
         let place = |aspect: &Aspect| {
-            let knot = different.partition_point(|other| order(other, aspect).is_lt()) as u32;
+            let knot = different.partition_point(|other| other.in_order(aspect).is_lt()) as u32;
             Place { knots: [knot; 4], weights: [1.0, 0.0, 0.0, 0.0], slopes_per_rad: [0.0; 4] }
         };
         let places = aspects.iter().map(place).collect();
@@ -69,13 +68,6 @@ impl Angles {
         let to_radar = retro.map(|aspect| aspect.directions()[0]).collect();
         Angles { aspects, to_radar }
     }
-}
-
-/// By the angles one after another.
-fn order(a: &Aspect, b: &Aspect) -> Ordering {
-    let angles = |aspect: &Aspect| [aspect.theta_i_rad, aspect.theta_r_rad, aspect.delta_phi_rad];
-    let pairs = std::iter::zip(angles(a), angles(b));
-    pairs.map(|(a, b)| a.total_cmp(&b)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
 }
 
 /// ln σ⁰ at every knot.

@@ -116,6 +116,13 @@ pub enum Finding {
         /// Fitted looks.
         looks: f64,
     },
+    /// Residuals of neighbouring angles are alike.
+    NeighboursAlike {
+        /// Their correlation.
+        correlation: f64,
+        /// The correlation that chance exceeds in 1 of 1000 fits.
+        limit: f64,
+    },
     /// The fitted distribution does not explain the rows.
     PoorFit {
         /// Kolmogorov distance of the residuals from their expected distribution.
@@ -230,6 +237,11 @@ impl fmt::Display for Finding {
                 "the levels scatter by more than one look of speckle does (looks = {}): the model or the \
                  levels are off, which the intervals do not include",
                 significant(*looks, 2)
+            ),
+            Finding::NeighboursAlike { correlation, limit } => write!(
+                f,
+                "neighbouring angles are off alike (correlation {correlation:.2}, chance explains {limit:.2}): the form of \
+                 the law is off there, or neighbours share their speckle, and the intervals include neither"
             ),
             Finding::PoorFit { ks_distance, limit } => write!(
                 f,

@@ -1,5 +1,6 @@
 //! From where a point of a curve was lit and seen.
 
+use std::cmp::Ordering;
 use std::f64::consts::PI;
 
 use crate::brdf::Scattering;
@@ -20,6 +21,14 @@ impl Aspect {
     /// Backscatter at this incidence, rad.
     pub fn retro(theta_rad: f64) -> Aspect {
         Aspect { theta_i_rad: theta_rad, theta_r_rad: theta_rad, delta_phi_rad: 0.0 }
+    }
+
+    /// By incidence, then by azimuth, then by the angle of the receiver: next to each other are those that see nearly the
+    /// same.
+    pub fn in_order(&self, other: &Aspect) -> Ordering {
+        let angles = |of: &Aspect| [of.theta_i_rad, of.delta_phi_rad, of.theta_r_rad];
+        let pairs = std::iter::zip(angles(self), angles(other));
+        pairs.map(|(a, b)| a.total_cmp(&b)).fold(Ordering::Equal, Ordering::then)
     }
 
     /// Whether source and receiver are in the same direction.

@@ -282,8 +282,9 @@ fn verdict(stored: &[String], found: &[Finding]) -> Vec<String> {
 /// Whether a finding is so near to its limit that another search may miss it.
 fn is_borderline(finding: &Finding) -> bool {
     match finding {
-        // A report of an earlier program does not speak of energy, few rows and more than speckle.
+        // A report of an earlier program does not speak of energy, few rows, more than speckle and neighbours.
         Finding::StartsDisagree { .. }
+        | Finding::NeighboursAlike { .. }
         | Finding::TooMuch { .. }
         | Finding::FewRows { .. }
         | Finding::MoreThanSpeckle { .. } => true,
