@@ -44,7 +44,7 @@ impl FitSubject {
         store: Option<&Store>,
     ) -> Result<FitSubject, Error> {
         let path = Path::new(wanted);
-        if wanted.ends_with(".csv") || path.is_file() {
+        if wanted.ends_with(".csv") || wanted.ends_with(".bsdf") || path.is_file() {
             FitSubject::of_file(path, curve, columns)
         } else {
             FitSubject::of_material(wanted, curve, find_material(store, wanted, "")?)

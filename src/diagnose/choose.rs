@@ -240,7 +240,9 @@ fn add_best<'a>(search: &Search, model: &mut Explanation<'a>, trials: &mut [Tria
     let rivals = rivals.map(|one| trials[one.trial].effect).collect();
     let candidate = &mut trials[best].candidate;
     candidate.accepted = true;
-    model.added.push(Addition { class, evidence: Evidence::from(&*candidate), rivals });
+    let evidence = Evidence::from(&*candidate);
+    let by_starts = gain_of_starts(trials[best].tried);
+    model.added.push(Addition { class, evidence, by_starts, rivals });
     settled.retain(|one| one.trial == best);
     let Some(added) = settled.pop() else { return false };
     model.state = added.state;
@@ -300,7 +302,8 @@ fn add_pair<'a>(search: &Search, model: &mut Explanation<'a>, trials: &mut [Tria
         let by_cloud = by_cloud.clone();
         let evidence =
             Evidence { gain, placebo_gain, held_out_gain, held_out_se, size_db, by_cloud };
-        model.added.push(Addition { class: Vec::new(), evidence, rivals: Vec::new() });
+        let by_starts = gain_of_starts(trial.tried);
+        model.added.push(Addition { class: Vec::new(), evidence, by_starts, rivals: Vec::new() });
     }
     model.state = next;
     let pair = pair.map(|trial| trial.candidate.clone());

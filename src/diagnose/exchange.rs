@@ -5,6 +5,7 @@ use super::clouds;
 use super::evidence::{Evidence, Largest};
 use super::explanation::{Addition, Explanation};
 use super::scorer::State;
+use super::settings::gain_of_starts;
 use super::support::Judge;
 use super::trial::{Search, Trial};
 use crate::effects::Effect;
@@ -50,7 +51,7 @@ fn contest<'a>(
     let Some(mut trial) = search.trial(without, rival) else { return };
     let judge = Judge::new(*scorer, without, largest);
     let Some((held_out, _)) = judge.support(&mut trial) else { return };
-    let Trial { space, fit, mut candidate, .. } = trial;
+    let Trial { space, fit, mut candidate, tried, .. } = trial;
     let with_rival = scorer.settle(without, space, fit, held_out);
     candidate.held_out = Some(scorer.difference(&with_rival.held_out, &without.held_out));
     candidate.by_cloud = clouds::gains(scorer, &with_rival.held_out, &without.held_out);
@@ -60,7 +61,9 @@ fn contest<'a>(
     // Of effects that predict equally well the one that is worth more is better.
     let [better, se] = scorer.difference(&with_rival.held_out, &state.held_out);
     let is_tied = better.abs() <= (scorer.settings.standard_errors * se).max(SAME);
-    let is_better = if is_tied { with_rival.worth() > state.worth() } else { better > 0.0 };
+    let by_starts = gain_of_starts(tried);
+    let [own, other] = [state.worth() - last.by_starts, with_rival.worth() - by_starts];
+    let is_better = if is_tied { other > own } else { better > 0.0 };
     let mut loser = rival.name();
     if is_better {
         let placebo_gain = judge.placebo_gain(candidate.numbers);
@@ -70,6 +73,7 @@ fn contest<'a>(
         candidate.placebo_gain = Some(placebo_gain);
         loser = state.space.effects.last().map_or(loser, |effect| effect.name());
         last.evidence = Evidence::from(&candidate);
+        last.by_starts = by_starts;
         *state = with_rival;
     }
     let is_other = state.space.effects.last().is_some_and(|effect| effect.name() != loser);

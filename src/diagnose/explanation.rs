@@ -18,6 +18,8 @@ pub(super) struct Addition<'a> {
     /// Names of effects that predict the data as well.
     pub class: Vec<&'static str>,
     pub evidence: Evidence,
+    /// What chance gives the best of the starts of its search, in ln p.
+    pub by_starts: f64,
     /// Effects that did nearly as well.
     pub rivals: Vec<&'a dyn Effect>,
 }

@@ -68,7 +68,7 @@ impl Bistatic {
     /// # Errors
     /// A start out of range, a sample that is not above 0, fewer samples than unknowns.
     pub fn run(&self, start: &Brdf, samples: &[Sample]) -> Result<BistaticResult, FitError> {
-        let coordinates = Coordinates::new(start, &frequencies(start), &[], Some(1.0))?;
+        let coordinates = Coordinates::of_pairs(start, &frequencies(start), &[], Some(1.0))?;
         self.validate(samples, coordinates.len())?;
         let bounds = [coordinates.lower(), coordinates.upper()];
         // The rms of every start with where it ended, the given start first.

@@ -8,7 +8,7 @@
 use nalgebra::DVector;
 
 use super::error::FitError;
-use super::table::{Angles, Table};
+use super::table::{Aspects, Table};
 use crate::brdf::{Brdf, Mixture, Parameter};
 
 /// Name of the specular level S = (1 − k)·f_λ.
@@ -188,6 +188,30 @@ impl Coordinates {
         bounds: &[(String, [f64; 2])],
         looks: Option<f64>,
     ) -> Result<Coordinates, FitError> {
+        Coordinates::seen(start, fixed, bounds, looks, gauge)
+    }
+
+    /// The same for data of which source and receiver were in two directions: where a facet is met at an angle, its
+    /// reflectance grows from f_lambda towards 1, so that a mixture has no gauge.
+    ///
+    /// # Errors
+    /// As [`Coordinates::new`].
+    pub fn of_pairs(
+        start: &Brdf,
+        fixed: &[(String, f64)],
+        bounds: &[(String, [f64; 2])],
+        looks: Option<f64>,
+    ) -> Result<Coordinates, FitError> {
+        Coordinates::seen(start, fixed, bounds, looks, |_, _| None)
+    }
+
+    fn seen(
+        start: &Brdf,
+        fixed: &[(String, f64)],
+        bounds: &[(String, [f64; 2])],
+        looks: Option<f64>,
+        gauge: impl Fn(&Brdf, &[(String, f64)]) -> Option<f64>,
+    ) -> Result<Coordinates, FitError> {
         start.validate()?;
         let mut base = start.clone();
         for (path, value) in fixed {
@@ -306,7 +330,7 @@ impl Coordinates {
     }
 
     /// ln σ⁰ of the model at a point of the search, as the beam sees it.
-    pub(super) fn table(&self, at: &DVector<f64>, angles: &Angles) -> Table {
+    pub(super) fn table(&self, at: &DVector<f64>, angles: &Aspects) -> Table {
         Table::new(&self.model(at), self.beam_rad, angles)
     }
 

@@ -35,7 +35,8 @@ pub enum FitError {
     Observation(#[from] ObservationError),
     /// A row whose source and receiver were in two directions, for a method that knows backscatter alone.
     #[error(
-        "row {row} (from 0) is not backscatter, and least squares knows nothing else; use the method censored"
+        "in row {row} (from 0) source and receiver were in two directions, and mse and tls know backscatter alone; use \
+         --method censored"
     )]
     Bistatic {
         /// Row, from 0.

@@ -10,7 +10,7 @@ use statrs::function::erf::{erfc, erfc_inv};
 use super::coordinates::Coordinates;
 use super::likelihood::Likelihood;
 use super::settings::{Fit, Method};
-use super::table::Angles;
+use super::table::Aspects;
 use crate::material::{Aspect, Goodness, Observation};
 use crate::radar::random::{Key, Purpose};
 use crate::radar::speckle::standard_deviation_db;
@@ -24,7 +24,7 @@ pub(super) fn residuals_db(
     rows: &[Observation],
 ) -> Vec<f64> {
     let aspects: Vec<Aspect> = rows.iter().map(Observation::aspect).collect();
-    let (angles, places) = Angles::of(&aspects);
+    let (angles, places) = Aspects::of(&aspects);
     let table = coordinates.table(at, &angles);
     let noise_w = fit.noise_w.unwrap_or(0.0);
     let detected = rows.iter().zip(&places).filter(|(row, _)| !row.is_censored());

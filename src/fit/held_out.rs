@@ -10,7 +10,7 @@ use super::goodness::residuals_db;
 use super::likelihood::Likelihood;
 use super::result::FitResult;
 use super::settings::Method;
-use crate::material::{CrossValidation, Observation};
+use crate::material::{Aspect, CrossValidation, Observation};
 use crate::measure::curve::Curve;
 use crate::radar::random::{Key, Purpose};
 
@@ -25,7 +25,8 @@ const RUNS: usize = 20;
 impl FitResult {
     /// Fits the curve again without each fifth of its blocks, and evaluates every fit on that fifth. Blocks
     /// are squares on the target where the rows have places; runs of consecutive chirps of a scan;
-    /// single rows of a sweep of the angle, of which a run would be a whole range of angles.
+    /// single rows of a sweep of the angle, of which a run would be a whole range of angles; and the rows of each pair of
+    /// directions where source and receiver were in two.
     ///
     /// `None` where there are fewer blocks than parts, where a part leaves too few detections for the fit,
     /// or where a fit does not converge.
@@ -99,6 +100,9 @@ struct Blocks {
 
 impl Blocks {
     fn new(rows: &[Observation]) -> Blocks {
+        if rows.iter().any(|row| !row.is_retro()) {
+            return Blocks::aspects(rows);
+        }
         let places: Option<Vec<[f64; 2]>> = rows.iter().map(|row| row.target_m).collect();
         places.and_then(|places| Blocks::squares(&places)).unwrap_or_else(|| Blocks::in_time(rows))
     }
@@ -115,6 +119,17 @@ impl Blocks {
             block_of_row,
             block_m: Some(side_m),
         })
+    }
+
+    /// One for each pair of directions.
+    fn aspects(rows: &[Observation]) -> Blocks {
+        let mut different: Vec<Aspect> = rows.iter().map(Observation::aspect).collect();
+        different.sort_by(Aspect::in_order);
+        different.dedup_by(|a, b| a.in_order(b).is_eq());
+        let block = |row: &Observation| {
+            different.partition_point(|other| other.in_order(&row.aspect()).is_lt())
+        };
+        Blocks { of: "points", block_of_row: rows.iter().map(block).collect(), block_m: None }
     }
 
     fn in_time(rows: &[Observation]) -> Blocks {

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use super::coordinates::Coordinates;
 use super::minimise::Local;
 use super::sensitivity::derivatives;
-use super::table::{Angles, Place, Table};
+use super::table::{Aspects, Place, Table};
 use crate::material::Observation;
 use crate::units::db_from_ratio;
 
@@ -62,8 +62,8 @@ impl<'a> Squares<'a> {
 
     /// ½Σ of squared residuals of detected rows, scaled by the deviations.
     pub fn local(&self, at: &DVector<f64>) -> Local {
-        let table = self.coordinates.table(at, Angles::knots());
-        let by_coordinate = derivatives(self.coordinates, at, Angles::knots(), &table);
+        let table = self.coordinates.table(at, Aspects::knots());
+        let by_coordinate = derivatives(self.coordinates, at, Aspects::knots(), &table);
         let parts: Vec<Local> = self
             .levels
             .par_chunks(CHUNK)
@@ -245,7 +245,7 @@ mod tests {
 
     #[test]
     fn the_nearest_point_is_nearer_than_its_neighbours() {
-        let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002), 0.0, Angles::knots());
+        let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002), 0.0, Aspects::knots());
         for row in (Twin { rows: 100, ..Twin::default() }).curve(3).observations {
             let Some(level) = Level::new(&row) else { continue };
             let cost = Gap { table: &table, level: &level, deviations: TLS }.nearest().cost();

@@ -16,7 +16,7 @@ use super::coordinates::Coordinates;
 use super::gamma_law::{GammaLaw, LnProbability};
 use super::minimise::Local;
 use super::sensitivity::derivatives;
-use super::table::{Angles, Place, Table};
+use super::table::{Aspects, Place, Table};
 use crate::material::{Aspect, Observation};
 
 /// Rows that one task sums, fixed so that the sum is the same on any number of threads.
@@ -38,7 +38,7 @@ pub(super) struct Likelihood<'a> {
     coordinates: &'a Coordinates,
     chirps: Vec<Chirp>,
     /// The angles at which it needs a law.
-    pub angles: Angles,
+    pub aspects: Aspects,
     /// True angles of all rows without a detection.
     limits: usize,
 }
@@ -115,7 +115,7 @@ impl<'a> Likelihood<'a> {
         let aspects: Vec<Vec<(Aspect, f64)>> =
             rows.iter().map(|row| true_aspects(row, angles)).collect();
         let all: Vec<Aspect> = aspects.iter().flatten().map(|(aspect, _)| *aspect).collect();
-        let (angles, places) = Angles::of(&all);
+        let (tabulated, places) = Aspects::of(&all);
         let mut places = places.into_iter();
         let mut chirps = Vec::with_capacity(rows.len());
         for (row, aspects) in rows.iter().zip(aspects) {
@@ -126,7 +126,7 @@ impl<'a> Likelihood<'a> {
         }
         let has_limit = |chirp: &&Chirp| chirp.censored || chirp.ln_limit.is_some();
         let limits = chirps.iter().filter(has_limit).map(|c| c.nodes.len()).sum();
-        Likelihood { coordinates, chirps, angles, limits }
+        Likelihood { coordinates, chirps, aspects: tabulated, limits }
     }
 
     /// −ln likelihood, its gradient and a curvature.
@@ -164,8 +164,8 @@ impl<'a> Likelihood<'a> {
     }
 
     fn tables(&self, at: &DVector<f64>) -> Tables {
-        let ln_sigma0 = self.coordinates.table(at, &self.angles);
-        let by_unknown = derivatives(self.coordinates, at, &self.angles, &ln_sigma0);
+        let ln_sigma0 = self.coordinates.table(at, &self.aspects);
+        let by_unknown = derivatives(self.coordinates, at, &self.aspects, &ln_sigma0);
         let law = GammaLaw::for_limits(self.coordinates.looks(at), self.limits);
         Tables { ln_sigma0, by_unknown, law }
     }
@@ -192,7 +192,7 @@ impl<'a> Likelihood<'a> {
 
     /// ln of the probability of a lower power than that of the row, for each row.
     pub fn ln_below(&self, at: &DVector<f64>) -> Vec<f64> {
-        let table = self.coordinates.table(at, &self.angles);
+        let table = self.coordinates.table(at, &self.aspects);
         let law = GammaLaw::new(self.coordinates.looks(at));
         self.chirps.iter().map(|chirp| chirp.ln_below(&table, &law)).collect()
     }

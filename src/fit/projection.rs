@@ -72,7 +72,7 @@ impl<'a> Projection<'a> {
         let likelihood = Likelihood::coarse(coordinates, &sample(rows), noise_w);
         let looks = looks(coordinates).into_iter();
         let laws = looks.map(|looks| (looks, GammaLaw::new(looks))).collect();
-        Projection { coordinates, likelihood, parts: Parts::of(coordinates), laws }
+        Projection { coordinates, likelihood, parts: Parts::of(coordinates, rows), laws }
     }
 
     /// Up to `count` starts from one half of the places, 0 or 1, the best first; `factor` times as many places as usual
@@ -129,7 +129,7 @@ impl<'a> Projection<'a> {
     }
 
     fn sigma0(&self, at: &DVector<f64>) -> Vec<f64> {
-        let table = self.coordinates.table(at, &self.likelihood.angles);
+        let table = self.coordinates.table(at, &self.likelihood.aspects);
         table.values().iter().map(|ln_sigma0| ln_sigma0.exp()).collect()
     }
 
@@ -308,7 +308,7 @@ mod tests {
             let amplitudes_ln = DVector::from_element(law.rises.len(), -1.5);
             let best = Best { cost: 0.0, looks: 1.0, amplitudes_ln: amplitudes_ln.clone() };
             let start = projection.start(&law.at, &best);
-            let whole = coordinates.table(&start, &projection.likelihood.angles);
+            let whole = coordinates.table(&start, &projection.likelihood.aspects);
             for (found, expected) in
                 law.ln_sigma0(&amplitudes_ln).values().iter().zip(whole.values())
             {

@@ -8,7 +8,7 @@ use super::interval::DEVIATE_95;
 use super::minimise::Stop;
 use super::sensitivity::derivatives;
 use super::settings::Fit;
-use super::table::{Angles, Table};
+use super::table::{Aspects, Table};
 use super::verdict::Finding;
 use crate::brdf::{Brdf, ThroughBeam};
 use crate::material::{Aspect, CrossValidation, Estimate, Goodness};
@@ -83,7 +83,7 @@ impl FitResult {
 
     /// The same in any aspect.
     pub fn band_of(&self, aspect: Aspect) -> Band {
-        let (angles, places) = Angles::of(&[aspect]);
+        let (angles, places) = Aspects::of(&[aspect]);
         let here = self.coordinates.table(&self.at, &angles);
         let by = derivatives(&self.coordinates, &self.at, &angles, &here);
         let slope =

@@ -28,10 +28,12 @@ impl Fit {
                 Some(self.looks.unwrap_or(1.0))
             }
         };
-        let mut coordinates = Coordinates::new(start, &self.fixed, &self.bounds, looks)?
-            .seen_by(self.beam_rad.unwrap_or(0.0));
+        let are_retro = curve.observations.iter().all(Observation::is_retro);
+        let of = if are_retro { Coordinates::new } else { Coordinates::of_pairs };
+        let mut coordinates =
+            of(start, &self.fixed, &self.bounds, looks)?.seen_by(self.beam_rad.unwrap_or(0.0));
         if self.method == Method::Censored {
-            coordinates.redundant = Parts::of(&coordinates).redundant;
+            coordinates.redundant = Parts::of(&coordinates, &curve.observations).redundant;
         }
         let unknowns = coordinates.len();
         if coordinates.list.iter().all(|c| c.name == LOOKS) {
@@ -72,12 +74,7 @@ fn check_row(row: usize, observation: &Observation) -> Result<(), FitError> {
     }
     if !observation.delta_phi_rad.is_finite() {
         let (name, value) = ("delta_phi_rad", observation.delta_phi_rad);
-        return Err(FitError::Row { row, name, value, wanted: "not a number" });
-    }
-    if theta_sd_rad > 0.0 && !observation.is_retro() {
-        let wanted =
-            "where source and receiver were in two directions, whose angles count as exact";
-        return Err(FitError::Row { row, name: "theta_sd_rad", value: theta_sd_rad, wanted });
+        return Err(FitError::Row { row, name, value, wanted: "not a finite number" });
     }
     let sigma0 = level_sigma0(row, observation)?;
     for (name, value) in [("sigma0", sigma0), ("power_w", observation.power_w.unwrap_or(sigma0))] {
@@ -364,15 +361,18 @@ mod tests {
         let curve = plane(&truth, 100.0);
         let found = Fit::default().run(&mixture(0.6, 30.0, 0.01, 0.02), &curve).unwrap();
         assert!(found.converged, "{found:?}");
-        for (name, truth) in [
-            (SPECULAR_LEVEL, 0.05),
-            ("specular.m", 0.2),
-            (DIFFUSE_LEVEL, 0.004),
-            ("diffuse.alpha", 3.0),
-        ] {
+        assert_eq!(found.gauge_k, None, "a facet that is met at an angle tells f_lambda from k");
+        for (name, truth) in
+            [("specular.f_lambda", 0.05 / 0.9), ("specular.m", 0.2), ("diffuse.alpha", 3.0)]
+        {
             let estimate = found.estimate(name).unwrap();
             let off = (estimate.value - truth).abs() / estimate.sd.unwrap();
             assert!(off < 4.0, "{name}: {estimate:?}");
+        }
+        for (found, truth) in
+            found.model.identified_products().unwrap().into_iter().zip([0.05, 0.004])
+        {
+            assert!((found / truth).ln().abs() < 0.1, "{found} {truth}");
         }
         assert!((found.looks.unwrap() / 100.0).ln().abs() < 0.5, "{:?}", found.looks);
         let mirror =
@@ -387,6 +387,16 @@ mod tests {
         moved.observations[0].theta_r_rad += 1e-3;
         let again = quick().run(&found.model, &moved).unwrap();
         assert_ne!(again.data_hash, found.data_hash);
+    }
+
+    #[test]
+    fn a_permittivity_is_told_where_it_is_met_at_an_angle() {
+        let truth = crate::fit::model("kirchhoff-go").unwrap();
+        let found = Fit::default().run(&truth, &plane(&truth, 1e4)).unwrap();
+        let together = |f: &Finding| matches!(f, Finding::OnlyTogether { .. });
+        assert!(!found.verdict.iter().any(together), "{:?}", found.verdict);
+        let eps = found.estimate("eps_real").unwrap();
+        assert!((eps.value - 3.0).abs() < 4.0 * eps.sd.unwrap(), "{eps:?}");
     }
 
     #[test]
@@ -405,9 +415,9 @@ mod tests {
         let method = Method::Mse { split_rad: 0.1 };
         let refused = Fit { method, ..quick() }.run(&start(), &curve).unwrap_err();
         assert_eq!(refused, FitError::Bistatic { row: 0 });
-        curve.observations[5].theta_sd_rad = Some(0.01);
+        curve.observations[5].delta_phi_rad = f64::INFINITY;
         let refused = quick().run(&start(), &curve).unwrap_err().to_string();
-        assert!(refused.contains("row 5") && refused.contains("two directions"), "{refused}");
+        assert!(refused.contains("row 5") && refused.contains("not a finite number"), "{refused}");
     }
 
     #[test]

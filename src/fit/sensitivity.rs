@@ -4,7 +4,7 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::coordinates::{Coordinates, LOOKS};
-use super::table::{Angles, Table};
+use super::table::{Aspects, Table};
 
 /// Step in the search: about the relative error of a one-sided difference, far above that of its rounding.
 const STEP: f64 = 1e-6;
@@ -14,7 +14,7 @@ const STEP: f64 = 1e-6;
 pub(super) fn derivatives(
     coordinates: &Coordinates,
     at: &DVector<f64>,
-    angles: &Angles,
+    angles: &Aspects,
     here: &Table,
 ) -> Vec<Option<Table>> {
     let upper = coordinates.upper();

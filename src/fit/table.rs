@@ -1,11 +1,11 @@
-//! ln σ⁰ over θ, tabulated once for each set of parameters.
+//! ln σ⁰ of aspects, tabulated once for each set of parameters.
 //!
 //! A fit asks for σ⁰ at a hundred thousand angles for each set of parameters; a thousand knots and
 //! four-point interpolation answer within 1e-4 dB up to 80° for lobes down to m = 0.01. The knots lie
 //! at θ = θ_end·sinh(βx)/sinh β, x uniform: dense at the specular peak, where the curve bends most.
 //! The curve is even in θ, which gives the knot below the first.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::LazyLock;
 
 use crate::brdf::{Retro, Scattering, ThroughBeam};
@@ -22,52 +22,62 @@ const THETA_END_RAD: f64 = 0.999 * FRAC_PI_2;
 const LN_NOTHING: f64 = -600.0;
 
 /// The angle of every knot.
-static KNOTS: LazyLock<Angles> = LazyLock::new(|| {
+static KNOTS: LazyLock<Aspects> = LazyLock::new(|| {
     let share = |knot: usize| (BETA * knot as f64 / INTERVALS as f64).sinh() / BETA.sinh();
-    Angles::these((0..=INTERVALS).map(|knot| Aspect::retro(THETA_END_RAD * share(knot))).collect())
+    let theta_rad: Vec<f64> = (0..=INTERVALS).map(|knot| THETA_END_RAD * share(knot)).collect();
+    Aspects { retro: towards(&theta_rad), pairs: Vec::new() }
 });
 
 /// sinh β/θ_end: the argument of asinh per rad of θ, 1/rad.
 static STRETCH_PER_RAD: LazyLock<f64> = LazyLock::new(|| BETA.sinh() / THETA_END_RAD);
 
-/// The aspects of a surface for which laws are tabulated: backscatter at the knots, or the few aspects of a curve.
+/// The aspects of a surface at which laws are tabulated: backscatter at the knots, or what a curve has.
 #[derive(Clone, Debug)]
-pub(super) struct Angles {
-    aspects: Vec<Aspect>,
-    /// Towards the radar, where all are backscatter.
-    to_radar: Vec<Direction<Surface>>,
+pub(super) struct Aspects {
+    /// Towards the radar in backscatter.
+    retro: Vec<Direction<Surface>>,
+    /// Behind these, towards source and receiver.
+    pairs: Vec<[Direction<Surface>; 2]>,
 }
 
-impl Angles {
-    /// The knots, between which any angle is interpolated.
-    pub fn knots() -> &'static Angles {
+impl Aspects {
+    /// The knots, between which any backscatter is interpolated.
+    pub fn knots() -> &'static Aspects {
         &KNOTS
     }
 
-    /// These aspects and the place of each among them, or the knots where that is cheaper: where all are backscatter, and
-    /// more than there are knots.
-    pub fn of(aspects: &[Aspect]) -> (Angles, Vec<Place>) {
-        let mut different = aspects.to_vec();
-        different.sort_by(Aspect::in_order);
-        different.dedup();
-        if different.len() > INTERVALS && different.iter().all(|aspect| aspect.is_retro()) {
-            let places = aspects.iter().map(|aspect| Place::new(aspect.theta_i_rad)).collect();
-            return (Angles::knots().clone(), places);
-        }
+    /// These aspects and the place of each among them. Backscatter at more angles than there are knots is interpolated
+    /// between these, which is cheaper.
+    pub fn of(aspects: &[Aspect]) -> (Aspects, Vec<Place>) {
+        let (retro, mut pairs): (Vec<Aspect>, Vec<Aspect>) =
+            aspects.iter().partition(|aspect| aspect.is_retro());
+        let mut theta_rad: Vec<f64> = retro.iter().map(|aspect| aspect.theta_i_rad).collect();
+        theta_rad.sort_by(f64::total_cmp);
+        theta_rad.dedup_by(|a, b| a.total_cmp(b).is_eq());
+        pairs.sort_by(Aspect::in_order);
+        pairs.dedup_by(|a, b| a.in_order(b).is_eq());
+        let is_interpolated = theta_rad.len() > INTERVALS;
+        let retro = if is_interpolated { KNOTS.retro.clone() } else { towards(&theta_rad) };
         let place = |aspect: &Aspect| {
-            let knot = different.partition_point(|other| other.in_order(aspect).is_lt()) as u32;
-            Place { knots: [knot; 4], weights: [1.0, 0.0, 0.0, 0.0], slopes_per_rad: [0.0; 4] }
+            if !aspect.is_retro() {
+                let before = pairs.partition_point(|other| other.in_order(aspect).is_lt());
+                return Place::exact(retro.len() + before);
+            }
+            if is_interpolated {
+                return Place::new(aspect.theta_i_rad);
+            }
+            let theta = &aspect.theta_i_rad;
+            Place::exact(theta_rad.partition_point(|other| other.total_cmp(theta).is_lt()))
         };
         let places = aspects.iter().map(place).collect();
-        (Angles::these(different), places)
+        let pairs = pairs.into_iter().map(Aspect::directions).collect();
+        (Aspects { retro, pairs }, places)
     }
+}
 
-    fn these(aspects: Vec<Aspect>) -> Angles {
-        let are_retro = aspects.iter().all(|aspect| aspect.is_retro());
-        let retro = aspects.iter().filter(|_| are_retro);
-        let to_radar = retro.map(|aspect| aspect.directions()[0]).collect();
-        Angles { aspects, to_radar }
-    }
+/// Directions at these angles from the normal, rad.
+fn towards(theta_rad: &[f64]) -> Vec<Direction<Surface>> {
+    theta_rad.iter().map(|theta| Direction::from_angles(*theta, 0.0)).collect()
 }
 
 /// ln σ⁰ at every knot.
@@ -76,7 +86,7 @@ pub(super) struct Table {
     knots: Vec<f64>,
 }
 
-/// An angle among the knots, with its interpolation weights.
+/// An aspect among those that are tabulated, with its interpolation weights.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     /// The four knots around it.
@@ -89,19 +99,16 @@ pub(super) struct Place {
 
 impl Table {
     /// Tabulates a law as a beam of the divergence `beam_rad` sees it; without a beam, 0, the law itself.
-    pub fn new(law: &dyn Scattering, beam_rad: f64, angles: &Angles) -> Table {
-        let Angles { aspects, to_radar } = angles;
-        let sigma0: Vec<f64> = if to_radar.is_empty() {
-            let seen = ThroughBeam { law, beam_rad };
-            aspects.iter().map(|aspect| aspect.sigma0(&seen)).collect()
-        } else {
-            let looks: Vec<(f64, Direction<Surface>)> =
-                to_radar.iter().map(|to_radar| (beam_rad, *to_radar)).collect();
-            let f_per_sr = Retro::new(law).per_sr(&looks);
-            aspects.iter().zip(f_per_sr).map(|(aspect, f)| aspect.sigma0_per_f() * f).collect()
-        };
-        let ln_sigma0 = sigma0.into_iter().map(|sigma0| {
-            let ln_sigma0 = sigma0.ln();
+    pub fn new(law: &dyn Scattering, beam_rad: f64, aspects: &Aspects) -> Table {
+        let looks: Vec<(f64, Direction<Surface>)> =
+            aspects.retro.iter().map(|to_radar| (beam_rad, *to_radar)).collect();
+        let seen = ThroughBeam { law, beam_rad };
+        let retro = Retro::new(law).per_sr(&looks).into_iter().zip(&aspects.retro);
+        let retro = retro.map(|(f, to_radar)| f * to_radar.cos_theta().powi(2));
+        let pairs = aspects.pairs.iter();
+        let pairs = pairs.map(|&[i, o]| seen.f_per_sr(i, o) * i.cos_theta() * o.cos_theta());
+        let ln_sigma0 = retro.chain(pairs).map(|f_cos2| {
+            let ln_sigma0 = (4.0 * PI * f_cos2).ln();
             if ln_sigma0.is_nan() { LN_NOTHING } else { ln_sigma0.max(LN_NOTHING) }
         });
         Table { knots: ln_sigma0.collect() }
@@ -145,6 +152,12 @@ impl Table {
 }
 
 impl Place {
+    /// The place of one of the tabulated aspects.
+    fn exact(index: usize) -> Place {
+        let knots = [index as u32; 4];
+        Place { knots, weights: [1.0, 0.0, 0.0, 0.0], slopes_per_rad: [0.0; 4] }
+    }
+
     /// The place of an angle. Negative angles are mirrored, and angles beyond the last knot are clamped to it.
     pub fn new(theta_rad: f64) -> Place {
         Place::bending(theta_rad).0
@@ -204,7 +217,7 @@ mod tests {
 
     #[test]
     fn the_derivatives_are_those_of_the_value() {
-        let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002), 0.0, Angles::knots());
+        let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002), 0.0, Aspects::knots());
         for theta_rad in [-0.4, -1e-3, 0.0123, 0.071, 0.3, 1.1] {
             let (place, bends) = Place::bending(theta_rad);
             let at = |step: f64| table.at(&Place::new(theta_rad + step));
@@ -226,7 +239,7 @@ mod tests {
     fn interpolation_keeps_a_ten_thousandth_of_a_decibel_up_to_80_degrees() {
         for m in [0.01, 0.05, 0.2] {
             let model = mixture(m, 6.0, 0.05, 0.002);
-            let table = Table::new(&model, 0.0, Angles::knots());
+            let table = Table::new(&model, 0.0, Aspects::knots());
             for step in 0..40_000 {
                 let theta_rad = 80f64.to_radians() * f64::from(step) / 40_000.0;
                 let exact = model.sigma0(theta_rad).ln();
@@ -241,7 +254,7 @@ mod tests {
     #[test]
     fn the_angles_of_a_short_curve_are_not_interpolated() {
         let theta_rad = [0.3, 0.0, 1.2, 0.3, 0.05];
-        let (angles, places) = Angles::of(&theta_rad.map(Aspect::retro));
+        let (angles, places) = Aspects::of(&theta_rad.map(Aspect::retro));
         let model = mixture(0.05, 6.0, 0.05, 0.002);
         let table = Table::new(&model, 0.0, &angles);
         assert_eq!(table.values().len(), 4);
@@ -249,13 +262,32 @@ mod tests {
             let exact = model.sigma0(*theta_rad).ln();
             assert!((table.at(place) - exact).abs() < 1e-12, "{theta_rad}");
         }
-        let many: Vec<Aspect> = (0..=INTERVALS).map(|i| Aspect::retro(i as f64 * 1e-3)).collect();
-        assert_eq!(Angles::of(&many).0.aspects, Angles::knots().aspects);
+    }
+
+    #[test]
+    fn each_aspect_has_its_own_value_beside_any_number_of_others() {
+        let model = mixture(0.05, 6.0, 0.05, 0.002);
+        let apart = |theta_r_rad: f64, delta_phi_rad: f64| Aspect {
+            theta_i_rad: 0.4,
+            theta_r_rad,
+            delta_phi_rad,
+        };
+        let special = [apart(0.3, PI), apart(0.3, 0.0), apart(0.0, 0.0), Aspect::retro(-0.0)];
+        for count in [3, INTERVALS + 5] {
+            let many = (0..count).map(|i| Aspect::retro(i as f64 * 1e-3));
+            let all: Vec<Aspect> = many.chain(special).collect();
+            let (aspects, places) = Aspects::of(&all);
+            let table = Table::new(&model, 0.0, &aspects);
+            for (aspect, place) in all.iter().zip(&places) {
+                let gap = (table.at(place) - aspect.sigma0(&model).ln()).abs();
+                assert!(gap < 1e-4, "{count} {aspect:?}: {gap}");
+            }
+        }
     }
 
     #[test]
     fn the_slope_is_the_derivative_on_both_sides_of_the_normal() {
-        let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002), 0.0, Angles::knots());
+        let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002), 0.0, Aspects::knots());
         for theta_rad in [-0.12, -0.01, 0.002, 0.1, 0.7] {
             let at = |theta| table.at(&Place::new(theta));
             let expected = (at(theta_rad + 1e-6) - at(theta_rad - 1e-6)) / 2e-6;
@@ -266,7 +298,7 @@ mod tests {
 
     #[test]
     fn any_angle_has_a_place() {
-        let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002), 0.0, Angles::knots());
+        let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002), 0.0, Aspects::knots());
         for theta_rad in [-9.0, 0.0, 1.57, FRAC_PI_2, 3.0, f64::NAN, f64::INFINITY] {
             let value = table.at(&Place::new(theta_rad));
             assert!(value.is_finite() || theta_rad.is_nan(), "{theta_rad}: {value}");

@@ -3,7 +3,8 @@
 //! Cells are separated by what the header line has most of: commas, semicolons or tabs; blanks where it has none of
 //! these. Where commas do not separate, one comma in a number is its decimal sign, as in `-3,5`. In a first line of such
 //! numbers the commas do not count. A byte order mark and
-//! lines of `#` or `//` at the head are passed over.
+//! lines of `#` or `//` at the head are passed over. The last of these has the names where numbers follow and it has a word
+//! for each of them, as `numpy.savetxt` writes its header.
 
 use csv::StringRecord;
 
@@ -78,14 +79,20 @@ impl Table {
     /// # Errors
     /// The line that is not like the header.
     pub fn parse(bytes: &[u8], names: Names) -> Result<Table, FormatError> {
-        let bytes = without_head(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
+        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+        let head = head(bytes);
+        let bytes = without_head(bytes);
         let separator = Separator::of(&bytes);
         let mut rows = separator.rows(&bytes)?.into_iter().peekable();
         let first = rows.peek().map(|row| row.cells.clone()).unwrap_or_default();
         let has_decimal_commas = separator.has_decimal_commas();
         // NaN is no name, either.
         let has_numbers = first.iter().any(|text| parse(text, has_decimal_commas).is_some());
-        let columns = if has_numbers && names == Names::WhereTheyAre {
+        let commented =
+            head.filter(|_| has_numbers).and_then(|head| separator.names(head, first.len()));
+        let columns = if let Some(commented) = commented {
+            commented
+        } else if has_numbers && names == Names::WhereTheyAre {
             (1..=first.len()).map(|number| number.to_string()).collect()
         } else {
             rows.next();
@@ -326,6 +333,20 @@ impl Separator {
         self != Separator::Byte(b',')
     }
 
+    /// Different names of so many columns in the last line of a head; `None` where it has no such names.
+    fn names(self, head: &[u8], count: usize) -> Option<Vec<String>> {
+        let text = std::str::from_utf8(head).ok()?;
+        let words: Vec<String> = match self {
+            Separator::Byte(mark) if text.contains(mark as char) => {
+                text.split(mark as char).map(|word| word.trim().to_owned()).collect()
+            }
+            _ => text.split_whitespace().map(str::to_owned).collect(),
+        };
+        let is_name = |word: &String| !word.is_empty() && parse(word, true).is_none();
+        let are_names = words.len() == count && words.iter().all(is_name);
+        (are_names && twice(&words).is_none()).then_some(words)
+    }
+
     fn rows(self, bytes: &[u8]) -> Result<Vec<Row>, FormatError> {
         match self {
             Separator::Blanks => rows_of_words(bytes),
@@ -351,7 +372,7 @@ fn rows_of_words(bytes: &[u8]) -> Result<Vec<Row>, FormatError> {
     let mut rows = Vec::new();
     for (line, bytes) in (1..).zip(bytes.split(|byte| *byte == b'\n')) {
         let text = std::str::from_utf8(bytes).map_err(|_| {
-            FormatError::at(format!("line {line}"), "the text is not UTF-8", "mend the line")
+            FormatError::at(format!("line {line}"), "the text is not UTF-8", "save it as UTF-8")
         })?;
         let cells = StringRecord::from_iter(text.split_whitespace());
         if !cells.is_empty() {
@@ -371,12 +392,25 @@ fn malformed(error: csv::Error) -> FormatError {
 }
 
 /// The bytes with the comment lines at the head emptied, so that the other lines keep their numbers.
+/// The text of the last line of `#` or `//` before the table, without these marks.
+fn head(bytes: &[u8]) -> Option<&[u8]> {
+    let lines = bytes.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii);
+    let head = lines.take_while(|line| line.is_empty() || is_comment(line));
+    let last = head.filter(|line| !line.is_empty()).last()?;
+    let mark = last.iter().take_while(|byte| [b'#', b'/'].contains(byte)).count();
+    Some(last[mark..].trim_ascii())
+}
+
+fn is_comment(line: &[u8]) -> bool {
+    line.starts_with(b"#") || line.starts_with(b"//")
+}
+
 fn without_head(bytes: &[u8]) -> Vec<u8> {
     let mut kept = Vec::with_capacity(bytes.len());
     let mut is_head = true;
     for line in bytes.split_inclusive(|byte| *byte == b'\n') {
         let text = line.trim_ascii();
-        is_head &= text.is_empty() || text.starts_with(b"#") || text.starts_with(b"//");
+        is_head &= text.is_empty() || is_comment(text);
         kept.extend_from_slice(if is_head { b"\n" } else { line });
     }
     kept
@@ -388,6 +422,26 @@ mod tests {
 
     fn read(text: &str) -> Result<Table, FormatError> {
         Table::read(text.as_bytes(), &["theta_deg"], &["sigma0_db"])
+    }
+
+    #[test]
+    fn a_header_behind_a_comment_mark_is_one() {
+        for text in [
+            "# made by hand\n# E N RSSI\n1 2 -60\n",
+            "#E,N,RSSI\n1,2,-60\n",
+            "// E;N;RSSI\n1;2;-6,5\n",
+        ] {
+            for names in [Names::InFirstLine, Names::WhereTheyAre] {
+                let table = Table::parse(text.as_bytes(), names).unwrap();
+                let columns: Vec<&str> = table.columns().collect();
+                assert_eq!((columns, table.len()), (vec!["E", "N", "RSSI"], 1), "{text}");
+            }
+        }
+        for head in ["two words", "1 2 3", "E N E", "E  N RSSI dBm"] {
+            let text = format!("# {head}\n1 2 -60\n");
+            let table = Table::parse(text.as_bytes(), Names::WhereTheyAre).unwrap();
+            assert_eq!(table.columns().collect::<Vec<_>>(), ["1", "2", "3"], "{head}");
+        }
     }
 
     #[test]

@@ -23,6 +23,23 @@ impl Aspect {
         Aspect { theta_i_rad: theta_rad, theta_r_rad: theta_rad, delta_phi_rad: 0.0 }
     }
 
+    /// In the plane of incidence, rad; the angle of the receiver is positive on the mirror's side.
+    pub fn in_plane(theta_i_rad: f64, theta_s_rad: f64) -> Aspect {
+        let delta_phi_rad = if theta_s_rad > 0.0 { PI } else { 0.0 };
+        Aspect { theta_i_rad, theta_r_rad: theta_s_rad.abs(), delta_phi_rad }
+    }
+
+    /// Angle of the receiver in the plane of incidence, rad, positive on the mirror's side; `None` out of the plane.
+    pub fn theta_s_rad(self) -> Option<f64> {
+        const SAME_RAD: f64 = 1e-9;
+        let turned = self.delta_phi_rad.rem_euclid(2.0 * PI);
+        if self.theta_r_rad == 0.0 || turned.min(2.0 * PI - turned) < SAME_RAD {
+            Some(-self.theta_r_rad)
+        } else {
+            ((turned - PI).abs() < SAME_RAD).then_some(self.theta_r_rad)
+        }
+    }
+
     /// By incidence, then by azimuth, then by the angle of the receiver: next to each other are those that see nearly the
     /// same.
     pub fn in_order(&self, other: &Aspect) -> Ordering {
@@ -62,6 +79,9 @@ impl Aspect {
     /// Angle between the normal and the middle of the two directions, rad: the tilt of a facet that mirrors one into the
     /// other, in backscatter the incidence.
     pub fn half_angle_rad(self) -> f64 {
+        if self.is_retro() {
+            return self.theta_i_rad;
+        }
         let Aspect { theta_i_rad, theta_r_rad, delta_phi_rad } = self;
         let along = theta_i_rad.sin() + theta_r_rad.sin() * delta_phi_rad.cos();
         let aside = theta_r_rad.sin() * delta_phi_rad.sin();
@@ -85,8 +105,21 @@ mod tests {
         assert!((middle_deg(30.0, 50.0, 180.0) - 10.0).abs() < 1e-9);
         assert!((middle_deg(30.0, 50.0, 0.0) - 40.0).abs() < 1e-9);
         // Out of the plane: h is along (1, 1, 2) for directions of 45 degrees a right angle of azimuth apart.
-        let expected_deg = (0.5f64.sqrt() / 2.0f64.sqrt()).atan().to_degrees();
-        assert!((middle_deg(45.0, 45.0, 90.0) - expected_deg).abs() < 0.5, "{expected_deg}");
+        let expected_deg = 0.5f64.sqrt().atan().to_degrees();
+        assert!((middle_deg(45.0, 45.0, 90.0) - expected_deg).abs() < 1e-9, "{expected_deg}");
+    }
+
+    #[test]
+    fn only_the_plane_of_incidence_has_an_angle_of_the_receiver() {
+        for theta_s_rad in [0.3, -0.3] {
+            assert_eq!(Aspect::in_plane(0.5, theta_s_rad).theta_s_rad(), Some(theta_s_rad));
+        }
+        let of = |theta_r_rad: f64, delta_phi_rad: f64| {
+            Aspect { theta_i_rad: 0.5, theta_r_rad, delta_phi_rad }.theta_s_rad()
+        };
+        assert_eq!(of(0.3, -PI), Some(0.3));
+        assert_eq!(of(0.3, 0.2), None);
+        assert_eq!(of(0.0, 0.2), Some(-0.0));
     }
 
     #[test]

@@ -12,7 +12,7 @@ use crate::material::{Censor, Fit, Material, Observation, Reach};
 use crate::units::db_from_ratio;
 
 /// Below this level, dB, nothing is said to come back.
-const FAINTEST_DB: f64 = -80.0;
+pub(super) const FAINTEST_DB: f64 = -80.0;
 
 /// What an angle may lose in its conversion to degrees and back, rad.
 const ROUNDING_RAD: f64 = 1e-9;

@@ -10,6 +10,7 @@ mod comparison;
 mod curve;
 mod effect;
 mod effect_help;
+mod fit_plot;
 mod history;
 mod json;
 mod level_table;
@@ -21,7 +22,6 @@ mod neighbours;
 mod picture;
 mod prediction;
 mod radar;
-mod receiver_plot;
 mod residuals;
 mod scan;
 mod search;
@@ -36,6 +36,7 @@ pub use cloud::{CloudAnswer, CloudRecord, CloudReport, NextSteps};
 pub use comparison::Comparison;
 pub use curve::{CurveAnswer, CurveRequest};
 pub use effect_help::EffectHelp;
+pub use fit_plot::FitPlot;
 pub use history::{RevisionRecord, revision_records};
 pub use json::{Record, json_file};
 pub use level_table::{AT_A_GLANCE_DEG, LevelRow, Sigma0Level, drawn_words, level_rows};
@@ -50,7 +51,6 @@ pub use neighbours::{Neighbour, NeighbourReport, NeighbourSearch};
 pub use picture::Picture;
 pub use prediction::{PredictedLevel, Prediction, angles_deg};
 pub use radar::RadarReport;
-pub use receiver_plot::{receiver_layers, receiver_plot};
 pub use scan::{
     BeatShape, Counts, PowerRange, ReceiverRecord, RegionRecord, RenderFiles, RenderProgress,
     RenderRequest, RenderStage, ScanRecord,

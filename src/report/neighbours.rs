@@ -98,7 +98,9 @@ impl NeighbourSearch {
         Ok(NeighbourSearch {
             observations: curve.observations.clone(),
             illumination: curve.illumination,
-            frequency_hz: measured_at_hz.or(instrument.map(|own| own.centre_frequency_hz)),
+            frequency_hz: measured_at_hz
+                .or(instrument.map(|own| own.centre_frequency_hz))
+                .or(Some(material.frequency_hz[0]).filter(|hz| *hz == material.frequency_hz[1])),
             own: is_current.then(|| material.slug.clone()),
         })
     }
@@ -150,6 +152,11 @@ impl NeighbourSearch {
         });
         report.materials.truncate(limit);
         report.notices.extend(self.one_sided(&report.materials));
+        if probe.has_pairs() {
+            let notice = "where source and receiver were in two directions the curve is compared with what scenes render \
+                          there: of a material that is known from backscatter alone, that is extrapolated";
+            report.notices.push(notice.to_owned());
+        }
         Ok(report)
     }
 

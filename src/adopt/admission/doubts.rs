@@ -92,7 +92,8 @@ fn of_claim(material: &Material) -> Option<String> {
 
 /// That all angles of a curve are as small as radians are.
 fn in_radians(curve: &Curve) -> Option<String> {
-    let angles_deg = curve.observations.iter().map(|row| row.theta_i_rad.to_degrees());
+    let angles = curve.observations.iter().flat_map(|row| [row.theta_i_rad, row.theta_r_rad]);
+    let angles_deg = angles.map(f64::to_degrees);
     let widest_deg = angles_deg.fold(0.0, f64::max);
     let is_few = curve.observations.len() < FEWEST_ANGLES;
     (!is_few && (FEW_RADIANS..FRAC_PI_2).contains(&widest_deg)).then(|| {

@@ -2,6 +2,7 @@
 
 use super::detail::Detail;
 use super::error::ExchangeError;
+use crate::brdf::Brdf;
 use crate::formats::ColumnNames;
 use crate::material::{Material, Slug, SourceKind};
 
@@ -36,6 +37,8 @@ pub struct Details {
     pub frequency_hz: Option<f64>,
     /// Least power that counts as a detection, W.
     pub threshold_w: Option<f64>,
+    /// Name and start of a model that is fitted to a curve and rendered in its place.
+    pub model: Option<(String, Brdf)>,
     /// Our names for the columns of a table.
     pub columns: ColumnNames,
 }

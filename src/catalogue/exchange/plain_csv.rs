@@ -11,6 +11,7 @@ use super::details::{Details, file_name, missing};
 use super::error::ExchangeError;
 use super::export_files::Export;
 use super::subject::{Points, Subject};
+use crate::fit::Fit;
 use crate::formats::FormatError;
 use crate::formats::words::round_significant;
 use crate::material::{
@@ -129,7 +130,47 @@ pub(super) fn read(
         illumination,
         observations,
     };
-    Ok((of_curve(file, given, single), notices))
+    let mut material = of_curve(file, given, single);
+    render_model(file, given, &mut material)?;
+    Ok((material, notices))
+}
+
+/// Fits the wanted model to a material's only curve; scenes then render it.
+fn render_model(file: &str, given: &Details, material: &mut Material) -> Result<(), ExchangeError> {
+    let [curve] = material.curves.as_slice() else { return Ok(()) };
+    let refuse = |problem: String, way_out: &str| {
+        Err(ExchangeError::in_file(file, FormatError::at("the table", problem, way_out)))
+    };
+    let Some((name, model)) = &given.model else {
+        if curve.observations.iter().any(Observation::is_retro) {
+            return Ok(());
+        }
+        let problem =
+            "no row is backscatter, which is all that scenes render of a curve".to_owned();
+        let way_out = "name a model that is fitted to it and rendered, as --model mixture-ggx does";
+        return refuse(problem, way_out);
+    };
+    let points = match crate::measure::Curve::of_material(curve) {
+        Ok(points) => points,
+        Err(error) => return refuse(error.to_string(), "leave that point out"),
+    };
+    let settings = Fit { beam_rad: curve.illumination.beam_rad, ..Fit::default() };
+    let found = match settings.run(model, &points) {
+        Ok(found) if found.converged => found,
+        Ok(_) => {
+            let problem = format!("the fit of {name} did not converge");
+            return refuse(problem, "name another --model");
+        }
+        Err(error) => {
+            return refuse(format!("{name} cannot be fitted: {error}"), "name another --model");
+        }
+    };
+    let mut fit =
+        found.stored(&format!("{name}-{}", found.method_name()), &curve.name, &curve.source);
+    fit.report.iter_mut().for_each(|report| report.held_out = found.hold_out(&points));
+    material.render = fit.name.clone();
+    material.fits.push(fit);
+    Ok(())
 }
 
 /// A curve and all that an entry must state about it.

@@ -2,18 +2,21 @@
 
 use std::path::PathBuf;
 
+use clap::builder::PossibleValuesParser;
+
 use crate::adopt::{check_frequency_and_threshold, foreign_format};
 use crate::catalogue::exchange::Details;
 use crate::cli::curves::kind_of;
 use crate::cli::list::KINDS;
 use crate::error::Error;
+use crate::fit::{model, model_names};
 use crate::formats::ColumnNames;
 use crate::material::{Slug, SourceKind};
 use crate::units::watts_from_dbm;
 
 /// What a foreign file does not say.
 #[derive(Debug, Default, PartialEq, clap::Args)]
-#[command(next_help_heading = "For a .csv, .brdf or .yml file")]
+#[command(next_help_heading = "For a .csv, .bsdf, .brdf or .yml file")]
 pub(super) struct DetailArgs {
     /// Short name that the material gets
     #[arg(long, value_name = "NAME")]
@@ -51,6 +54,9 @@ pub(super) struct DetailArgs {
     /// Origin of the numbers
     #[arg(long, value_parser = kind_of(KINDS))]
     kind: Option<SourceKind>,
+    /// Model that is fitted to a curve and rendered in its place; a table without backscatter needs one
+    #[arg(long, value_name = "MODEL", value_parser = PossibleValuesParser::new(model_names()))]
+    model: Option<String>,
     /// Name of the instrument
     #[arg(long, value_name = "TEXT")]
     instrument: Option<String>,
@@ -74,7 +80,10 @@ impl DetailArgs {
             2.. => "several foreign files would get one name",
             _ => return Ok(()),
         };
-        Err(Error::usage(problem, "name one .csv, .brdf or .yml file with --from, and no other"))
+        Err(Error::usage(
+            problem,
+            "name one .csv, .bsdf, .brdf or .yml file with --from, and no other",
+        ))
     }
 
     /// The flags as plain values.
@@ -95,6 +104,7 @@ impl DetailArgs {
             licence: self.licence.clone(),
             source: self.source.clone(),
             kind: self.kind,
+            model: self.model.clone().and_then(|name| Some((name.clone(), model(&name)?))),
             instrument: self.instrument.clone(),
             frequency_hz,
             threshold_w,

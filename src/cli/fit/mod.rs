@@ -14,11 +14,9 @@ use super::plot::write_plot;
 use crate::adopt::{FitMethod, FitOutcome, FitRequest, FitStorage, FitSubject, StoredFit};
 use crate::error::Error;
 use crate::fit::{FitResult, model_names};
-use crate::material::{Fit, Observation, SourceKind};
+use crate::material::{Fit, SourceKind};
 use crate::radar::Radar;
-use crate::report::{
-    FigureFormat, curve_points, fit_layers, incidence_plot, receiver_layers, receiver_plot,
-};
+use crate::report::{FigureFormat, FitPlot};
 use crate::setup::{Database, unmet_conditions, unmet_sentence};
 use crate::units::watts_from_dbm;
 
@@ -106,7 +104,7 @@ pub(super) struct Args {
     /// Who measured or made a file's curve, when and how
     #[arg(long, value_name = "TITLE", requires = "save")]
     source: Option<String>,
-    /// Draw points, fit and 95 % band: a .svg or .png file
+    /// Draw points and fit, with its 95 % band in backscatter: a .svg or .png file
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
     #[command(flatten)]
@@ -207,20 +205,13 @@ fn draw(
     fit: &Fit,
     console: &Console,
 ) -> Result<Vec<String>, Error> {
-    let rows = &subject.curve.observations;
     let file = subject.file.as_ref().and_then(|file| file.file_name());
     let title = file.map_or(subject.label.clone(), |file| file.to_string_lossy().into_owned());
-    if rows.iter().all(Observation::is_retro) {
-        let points = curve_points(&subject.curve_name, rows);
-        let series = fit_layers(std::slice::from_ref(fit), points);
-        let subtitle = format!("{}, with its 95 % band", fit.name);
-        return write_plot(path, &incidence_plot(&title, &subtitle, series));
+    match FitPlot::new(title, &subject.curve_name, &subject.curve.observations, fit) {
+        Some(drawn) => write_plot(path, &drawn.plot()),
+        None => {
+            console.notice("nothing is drawn: no row lies in the plane of incidence");
+            Ok(Vec::new())
+        }
     }
-    let series = receiver_layers(rows, fit);
-    if series.is_empty() {
-        console.notice("nothing is drawn: no row lies in the plane of incidence");
-        return Ok(Vec::new());
-    }
-    let subtitle = format!("{} in dashes", fit.name);
-    write_plot(path, &receiver_plot(&title, &subtitle, series))
 }

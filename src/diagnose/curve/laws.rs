@@ -2,7 +2,8 @@
 //! an effect.
 
 use crate::brdf::{
-    BlinnPhong, Brdf, CookTorrance, Correlation, Distribution, Kirchhoff, Lambert, Shadowing, Sum,
+    BlinnPhong, Brdf, CookTorrance, Correlation, Distribution, Kirchhoff, Lambert, Parameter,
+    Shadowing, Sum,
 };
 use crate::fit::model;
 
@@ -15,8 +16,8 @@ const TWO_LOBES: [(&str, [Distribution; 2]); 3] = [
     ("two Beckmann lobes over Lambert", [Distribution::Beckmann, Distribution::Beckmann]),
 ];
 
-/// Every other model with its name.
-pub(super) fn other_laws() -> Vec<(&'static str, Brdf)> {
+/// Every other model than the declared one with its name.
+pub(super) fn other_laws(declared: &Brdf) -> Vec<(&'static str, Brdf)> {
     let named = BY_NAME.into_iter().filter_map(|name| Some((name, model(name)?)));
     let two = TWO_LOBES.into_iter().map(|(name, [narrow, wide])| {
         let parts = vec![flat(), lobe(narrow, 0.08), lobe(wide, 0.4)];
@@ -26,7 +27,21 @@ pub(super) fn other_laws() -> Vec<(&'static str, Brdf)> {
     let diffuse = Brdf::Sum(Sum { parts: vec![flat(), diffuse] });
     let exponential = model("kirchhoff").and_then(with_exponential_correlation);
     let exponential = exponential.map(|law| ("kirchhoff with exponential correlation", law));
-    named.chain(two).chain([("a diffuse lobe over Lambert", diffuse)]).chain(exponential).collect()
+    let over_lambert =
+        [("one GGX lobe over Lambert", base_law()), ("a diffuse lobe over Lambert", diffuse)];
+    let all = named.chain(over_lambert).chain(two).chain(exponential);
+    all.filter(|(_, law)| !is_same_form(law, declared)).collect()
+}
+
+/// Whether two models differ in their numbers only.
+fn is_same_form(a: &Brdf, b: &Brdf) -> bool {
+    let mut a = a.clone();
+    for Parameter { path, value, .. } in b.parameters() {
+        if !a.set_parameter(&path, value) {
+            return false;
+        }
+    }
+    a == *b
 }
 
 /// Kirchhoff's law of heights whose correlation has no curvature at its peak, as machined and natural surfaces have it.

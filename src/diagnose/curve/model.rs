@@ -7,6 +7,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::points::Kind;
 use super::points::{Point, Points};
 use super::terms::Term;
 use crate::brdf::{Brdf, Scattering};
@@ -67,8 +68,13 @@ impl Score {
 }
 
 impl Model {
-    pub fn new(law: &Brdf) -> Result<Model, FitError> {
-        let coordinates = Coordinates::new(law, &frequencies(law), &[], Some(1.0))?;
+    /// The model of a curve of this kind.
+    pub fn new(law: &Brdf, kind: Kind) -> Result<Model, FitError> {
+        let of = match kind {
+            Kind::Backscatter => Coordinates::new,
+            Kind::InPlane => Coordinates::of_pairs,
+        };
+        let coordinates = of(law, &frequencies(law), &[], Some(1.0))?;
         if coordinates.len() == 0 {
             return Err(FitError::NothingFree);
         }

@@ -46,7 +46,7 @@ impl CurveDiagnosis {
         if !(noise_db > 0.0 && noise_db <= 100.0) {
             return Err(CurveDiagnoseError::Noise { noise_db });
         }
-        let model = Model::new(&self.first_fit(points, law)?)?;
+        let model = Model::new(&self.first_fit(points, law)?, points.kind)?;
         let all = vec![true; points.points.len()];
         let fitted = model.fit(points, &all, &model.start());
         let levels_db = model.levels_db(&fitted.at, &points.points);
@@ -60,8 +60,8 @@ impl CurveDiagnosis {
         let before = selection.state(model, fitted);
         let mut compared = vec![Compared::new(&selection, DECLARED, before)];
         if !compared[0].explains() {
-            let others = other_laws().into_par_iter().filter_map(|(name, law)| {
-                let model = Model::new(&self.first_fit(points, &law).ok()?).ok()?;
+            let others = other_laws(law).into_par_iter().filter_map(|(name, law)| {
+                let model = Model::new(&self.first_fit(points, &law).ok()?, points.kind).ok()?;
                 let fitted = model.fit(points, &all, &model.start());
                 Some(Compared::new(&selection, name, selection.state(model, fitted)))
             });

@@ -6,8 +6,8 @@ use super::model::Model;
 use super::testing::{curve_of, noisy};
 use super::*;
 use crate::brdf::{Brdf, Scattering};
-use crate::measure::Curve;
 use crate::material::file::in_plane::InPlane;
+use crate::measure::Curve;
 use crate::units::{db_from_ratio, ratio_from_db};
 
 const INCIDENCES_DEG: [f64; 4] = [10.0, 30.0, 50.0, 70.0];
@@ -102,7 +102,7 @@ fn an_offset_of_the_angle_is_found_within_its_deviations() {
     let report = diagnosed(&drawn(1));
     assert_eq!(report.effects.len(), 1, "{report:#?}");
     assert_eq!(report.effects[0].name, "angle-offset");
-    let model = Model::new(&law).unwrap().with(term);
+    let model = Model::new(&law, Kind::InPlane).unwrap().with(term);
     let step_deg = term.parameters()[0].step;
     let start: Vec<f64> = model.start().iter().copied().chain([OFFSET_DEG / step_deg]).collect();
     let mut squares = 0.0;

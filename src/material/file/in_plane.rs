@@ -9,11 +9,9 @@
 //! Also read are the isotropic tables of optical design programs (`.bsdf`), whose angles are counted from
 //! the mirror direction: azimuth 0 leads towards the normal and past it, 180° away from it.
 
-use std::f64::consts::PI;
-
 use crate::formats::csv::{Names, Table};
 use crate::formats::{ColumnNames, FormatError};
-use crate::material::Observation;
+use crate::material::{Aspect, Observation};
 
 /// One measured value.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,19 +72,33 @@ pub fn read_table(
 impl InPlane {
     /// The value as a point of a curve.
     pub fn observation(&self) -> Observation {
-        let place = Observation {
-            theta_r_rad: self.theta_s_rad.abs(),
-            // Back where the light came from, or on the other side of the normal.
-            delta_phi_rad: if self.theta_s_rad > 0.0 { PI } else { 0.0 },
-            ..Observation::backscatter(self.theta_i_rad, Some(1.0), None)
-        };
-        Observation { sigma0: Some(self.f_per_sr * place.aspect().sigma0_per_f()), ..place }
+        let aspect = Aspect::in_plane(self.theta_i_rad, self.theta_s_rad);
+        let sigma0 = self.f_per_sr * aspect.sigma0_per_f();
+        Observation {
+            theta_r_rad: aspect.theta_r_rad,
+            delta_phi_rad: aspect.delta_phi_rad,
+            ..Observation::backscatter(self.theta_i_rad, Some(sigma0), None)
+        }
+    }
+
+    /// A detection of a curve as a value; `None` out of the plane of incidence.
+    pub fn of(row: &Observation) -> Option<InPlane> {
+        let aspect = row.aspect();
+        Some(InPlane {
+            theta_i_rad: row.theta_i_rad,
+            theta_s_rad: aspect.theta_s_rad()?,
+            f_per_sr: row.sigma0? / aspect.sigma0_per_f(),
+            sd_db: None,
+        })
     }
 }
 
-/// Whether the bytes are a `.bsdf` table, by the line that its values follow.
+/// Whether the bytes are a `.bsdf` table, by the words that its header has.
 pub fn is_bsdf(bytes: &[u8]) -> bool {
-    bytes.split(|byte| *byte == b'\n').any(|line| line.trim_ascii() == b"DataBegin")
+    let words = ["AngleOfIncidence", "ScatterRadial", "ScatterAzimuth", "DataBegin"];
+    let lines = bytes.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii);
+    let mut first_words = lines.filter_map(|line| line.split(u8::is_ascii_whitespace).next());
+    first_words.any(|first| words.iter().any(|word| word.as_bytes() == first))
 }
 
 /// Whether the bytes are a table of bistatic values, by its header.
@@ -149,6 +161,11 @@ pub fn read_bsdf(bytes: &[u8]) -> Result<Vec<InPlane>, FormatError> {
                 }
             }
         }
+    }
+    if found.is_empty() {
+        let problem = "no value lies in the plane of incidence";
+        let way_out = "give the azimuths 0 and 180, and values above 0";
+        return Err(FormatError::at("the file", problem, way_out));
     }
     Ok(found)
 }
@@ -219,6 +236,13 @@ impl Header {
         let row = numbers(line, text)?;
         if row.len() != self.radials_deg.len() {
             let problem = format!("{} values for {} angles", row.len(), self.radials_deg.len());
+            return Err(FormatError::at(format!("line {line}"), problem, "correct the line"));
+        }
+        let (least, greatest) = VALUES_PER_SR;
+        if let Some(value) =
+            row.iter().find(|value| **value > 0.0 && !(least..=greatest).contains(value))
+        {
+            let problem = format!("`{value:e}` is no value of f in 1/sr");
             return Err(FormatError::at(format!("line {line}"), problem, "correct the line"));
         }
         Ok(row)

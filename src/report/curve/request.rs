@@ -6,7 +6,8 @@ use crate::brdf::Brdf;
 use crate::diagnose::curve::{CurveDiagnosis, CurveReport, Points, Term, base_law};
 use crate::error::Error;
 use crate::formats::{ColumnNames, FormatError};
-use crate::material::file::in_plane;
+use crate::material::Observation;
+use crate::material::file::in_plane::{self, InPlane};
 use crate::measure::Curve;
 
 /// What to diagnose.
@@ -55,21 +56,25 @@ impl CurveRequest<'_> {
                 .map(|(table, notices)| (Points::in_plane(&table, noise_db), notices))
         } else {
             Curve::read_as(bytes, self.columns).and_then(|(curve, notices)| {
-                refuse_other_directions(&curve)?;
-                Ok((Points::backscatter(&curve, noise_db), notices))
+                if curve.observations.iter().all(Observation::is_retro) {
+                    return Ok((Points::backscatter(&curve, noise_db), notices));
+                }
+                Ok((Points::in_plane(&values(&curve)?, noise_db), notices))
             })
         };
         points.map_err(|error| Error::CurveFile { file: self.path.to_owned(), error })
     }
 }
 
-/// Refuses a point that was lit and seen from two directions in a table of backscatter.
-fn refuse_other_directions(curve: &Curve) -> Result<(), FormatError> {
-    let Some(place) = curve.observations.iter().position(|row| !row.is_retro()) else {
-        return Ok(());
-    };
-    let place = format!("point {} (from 1)", place + 1);
-    let way_out =
-        "give a table in the plane of incidence: theta_i_deg, theta_s_deg and brdf_per_sr";
-    Err(FormatError::at(place, "source and receiver were in two directions", way_out))
+/// The detections of a curve as values in the plane of incidence.
+fn values(curve: &Curve) -> Result<Vec<InPlane>, FormatError> {
+    let mut values = Vec::new();
+    for (place, row) in curve.observations.iter().enumerate().filter(|(_, row)| !row.is_censored())
+    {
+        values.push(InPlane::of(row).ok_or_else(|| {
+            let place = format!("point {} (from 1)", place + 1);
+            FormatError::at(place, "it is out of the plane of incidence", "leave such points out")
+        })?);
+    }
+    Ok(values)
 }

@@ -167,7 +167,8 @@ fn effect(found: &FoundTerm) -> String {
 fn error(report: &CurveReport) -> String {
     let error = &report.error;
     let mut text = format!("error on held-out angles: {:.2}", error.before.rmse_db);
-    if !report.effects.is_empty() {
+    // By another law, or with what was added.
+    if error.after.rmse_db != error.before.rmse_db {
         text += &format!(" → {:.2}", error.after.rmse_db);
     }
     text += &format!(
