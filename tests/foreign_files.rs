@@ -310,6 +310,18 @@ fn a_foreign_curve_is_fitted_compared_and_stored() {
     assert!(said(at, add).contains("added plane"));
     let shown = said(at, "show plane --json");
     assert!(shown.contains("theta_r_rad"), "{shown}");
+    // The same as rows of two directions is diagnosed alike; one out of the plane of incidence is not.
+    let mut rows = "theta_deg,theta_r_deg,delta_phi_deg,sigma0_db\n".to_owned();
+    for k in 0..40 {
+        let level_db = 1.0 - 0.05 * f64::from(k) + 0.1 * f64::from(k % 3);
+        rows += &format!("20,{},180,{level_db}\n", 2 * k);
+    }
+    fs::write(at.join("rows.csv"), &rows).unwrap();
+    let found = said(at, "diagnose --curve rows.csv --noise-db 0.1 -o rows");
+    assert!(found.contains("error on held-out angles"), "{found}");
+    fs::write(at.join("aside.csv"), rows + "20,30,90,1\n").unwrap();
+    let error = refused(at, "diagnose --curve aside.csv --noise-db 0.1 -o aside");
+    assert!(error.contains("point 41 (from 1): it is out of the plane of incidence"), "{error}");
     // Levels of an unknown unit have a shape alone.
     let relative = "theta_deg,sigma0_db,relative\n5,20,1\n10,19,1\n20,15,1\n30,9,1\n";
     fs::write(at.join("relative.csv"), relative).unwrap();
@@ -321,6 +333,64 @@ fn a_foreign_curve_is_fitted_compared_and_stored() {
     let saved = said(at, "fit plane --model lambert --save");
     assert!(saved.contains("stored as fit"), "{saved}");
     said(at, "check");
+}
+
+#[test]
+fn a_table_without_backscatter_is_stored_with_the_model_that_is_rendered() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    // A lobe over a floor at two incidences, in a table of an optical design program and in one of ours.
+    let radials_deg: Vec<f64> = (0..13).map(|k| f64::from(5 * k)).collect();
+    let axis: Vec<String> = radials_deg.iter().map(f64::to_string).collect();
+    let axis = axis.join(" ");
+    let mut bsdf = format!(
+        "Source Measured\nScatterType BRDF\nSampleRotation 1\n0\nAngleOfIncidence 2\n20 40\n\
+         ScatterAzimuth 2\n0 180\nScatterRadial 13\n{axis}\nMonochrome\nDataBegin\n"
+    );
+    let mut csv = "theta_i_deg,theta_s_deg,brdf_per_sr\n".to_owned();
+    for incidence_deg in [20.0, 40.0] {
+        bsdf += "TIS 0.2\n";
+        for towards in [-1.0, 1.0] {
+            let mut row = Vec::new();
+            for (place, radial_deg) in radials_deg.iter().enumerate() {
+                let theta_s_deg: f64 = incidence_deg + towards * radial_deg;
+                let tilt = 0.5 * (incidence_deg - theta_s_deg).to_radians();
+                let noise = 1.0 + 0.01 * f64::from((7 * place as u32) % 5) - 0.02;
+                let f = (0.03 + 0.4 * (-(tilt / 0.2).powi(2)).exp()) * noise;
+                row.push(format!("{f:.6}"));
+                if theta_s_deg.abs() <= 80.0
+                    && (towards < 0.0 || *radial_deg > 0.0)
+                    && theta_s_deg > -19.0
+                {
+                    csv += &format!("{incidence_deg},{theta_s_deg},{f:.6}\n");
+                }
+            }
+            bsdf += &format!("{}\n", row.join(" "));
+        }
+    }
+    fs::write(at.join("coating.bsdf"), bsdf).unwrap();
+    fs::write(at.join("coating.csv"), csv).unwrap();
+    let fit = said(at, "fit coating.bsdf --model mixture");
+    assert!(fit.contains("converged") && fit.contains("in two directions"), "{fit}");
+    assert!(
+        said(at, "near --curve coating.bsdf --measured-at 300").contains("angles of the curve")
+    );
+    let given = "--class paint --kind synthetic --source drawn --licence CC0-1.0 --frequency 300";
+    let error = refused(at, &format!("add --from coating.csv --name coating {given}"));
+    assert!(error.contains("no row is backscatter") && error.contains("--model"), "{error}");
+    let added = said(at, &format!("add --from coating.csv --model mixture --name coating {given}"));
+    assert!(added.contains("added coating, revision 1"), "{added}");
+    said(at, "check");
+    let near = said(at, "near --curve coating.csv --measured-at 300 --limit 1");
+    assert!(near.contains("coating") && !near.contains("left out: 0"), "{near}");
+    let predicted = said(at, "predict coating --angles 20:40:10");
+    assert!(predicted.contains("30"), "{predicted}");
+    assert!(
+        said(at, &format!("add --from coating.bsdf --model mixture --name two {given}"))
+            .contains("added two")
+    );
+    let error = refused(at, "fit absent.bsdf");
+    assert!(error.contains("cannot read absent.bsdf"), "{error}");
 }
 
 #[test]

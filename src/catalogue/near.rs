@@ -253,9 +253,9 @@ impl Bin {
             least += if point.is_censored() { 0.0 } else { level };
             greatest += level;
         }
-        let mean_db = |sum: f64| db_from_ratio(sum / points.len() as f64);
+        let level_db = [least, greatest].map(|sum: f64| db_from_ratio(sum / points.len() as f64));
         let aspects = points.first().map(|point| point.aspect()).into_iter().collect();
-        Some(Bin { aspects, degrees: None, level_db: [mean_db(least), mean_db(greatest)] })
+        Some(Bin { aspects, degrees: None, level_db })
     }
 }
 

@@ -126,10 +126,12 @@ impl Blocks {
         let mut different: Vec<Aspect> = rows.iter().map(Observation::aspect).collect();
         different.sort_by(Aspect::in_order);
         different.dedup_by(|a, b| a.in_order(b).is_eq());
-        let block = |row: &Observation| {
-            different.partition_point(|other| other.in_order(&row.aspect()).is_lt())
-        };
-        Blocks { of: "points", block_of_row: rows.iter().map(block).collect(), block_m: None }
+        let mut block_of_row = Vec::with_capacity(rows.len());
+        for row in rows {
+            let own = row.aspect();
+            block_of_row.push(different.partition_point(|other| other.in_order(&own).is_lt()));
+        }
+        Blocks { of: "points", block_of_row, block_m: None }
     }
 
     fn in_time(rows: &[Observation]) -> Blocks {

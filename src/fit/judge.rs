@@ -107,8 +107,8 @@ fn judge_rows(result: &FitResult, rows: &[Observation]) -> Vec<Finding> {
         _ => SPLIT_DEG,
     };
     let detected: Vec<&Observation> = rows.iter().filter(|row| !row.is_censored()).collect();
-    let tilt_deg = |row: &Observation| row.aspect().half_angle_rad().to_degrees();
-    let near = detected.iter().filter(|row| tilt_deg(row) < split_deg).count();
+    let tilts_deg = detected.iter().map(|row| row.aspect().half_angle_rad().to_degrees());
+    let near = tilts_deg.filter(|tilt_deg| *tilt_deg < split_deg).count();
     let is_mixture = matches!(result.model, Brdf::Mixture(_));
     if is_mixture && near == 0 {
         findings.push(Finding::NoSpecularRows { below_deg: split_deg });

@@ -32,8 +32,7 @@ const ANGLES_RAD: [f64; 4] = [0.0, 0.05, 0.3, 1.0];
 /// Every n-th row by the tilt of the facets that it sees, in backscatter the incidence.
 pub(super) fn sample(rows: &[Observation]) -> Vec<Observation> {
     let mut sorted = rows.to_vec();
-    let tilt_rad = |row: &Observation| row.aspect().half_angle_rad();
-    sorted.sort_by(|a, b| tilt_rad(a).total_cmp(&tilt_rad(b)));
+    sorted.sort_by(|a, b| a.aspect().half_angle_rad().total_cmp(&b.aspect().half_angle_rad()));
     sorted.into_iter().step_by(rows.len().div_ceil(ROWS).max(1)).collect()
 }
 

@@ -102,15 +102,18 @@ impl Table {
     pub fn new(law: &dyn Scattering, beam_rad: f64, aspects: &Aspects) -> Table {
         let looks: Vec<(f64, Direction<Surface>)> =
             aspects.retro.iter().map(|to_radar| (beam_rad, *to_radar)).collect();
+        let f_per_sr = Retro::new(law).per_sr(&looks);
+        let mut sigma0 = Vec::with_capacity(looks.len() + aspects.pairs.len());
+        for ((_, v), f_per_sr) in looks.iter().zip(f_per_sr) {
+            sigma0.push(4.0 * PI * f_per_sr * v.cos_theta().powi(2));
+        }
         let seen = ThroughBeam { law, beam_rad };
-        let retro = Retro::new(law).per_sr(&looks).into_iter().zip(&aspects.retro);
-        let retro = retro.map(|(f, to_radar)| f * to_radar.cos_theta().powi(2));
-        let pairs = aspects.pairs.iter();
-        let pairs = pairs.map(|&[i, o]| seen.f_per_sr(i, o) * i.cos_theta() * o.cos_theta());
-        let ln_sigma0 = retro.chain(pairs).map(|f_cos2| {
-            let ln_sigma0 = (4.0 * PI * f_cos2).ln();
-            if ln_sigma0.is_nan() { LN_NOTHING } else { ln_sigma0.max(LN_NOTHING) }
-        });
+        for &[i, o] in &aspects.pairs {
+            sigma0.push(4.0 * PI * seen.f_per_sr(i, o) * i.cos_theta() * o.cos_theta());
+        }
+        let ln_sigma0 = sigma0.into_iter().map(f64::ln);
+        let ln_sigma0 =
+            ln_sigma0.map(|ln| if ln.is_nan() { LN_NOTHING } else { ln.max(LN_NOTHING) });
         Table { knots: ln_sigma0.collect() }
     }
 

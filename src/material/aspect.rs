@@ -43,8 +43,9 @@ impl Aspect {
     /// By incidence, then by azimuth, then by the angle of the receiver: next to each other are those that see nearly the
     /// same.
     pub fn in_order(&self, other: &Aspect) -> Ordering {
-        let angles = |of: &Aspect| [of.theta_i_rad, of.delta_phi_rad, of.theta_r_rad];
-        let pairs = std::iter::zip(angles(self), angles(other));
+        let [own, theirs] =
+            [self, other].map(|of| [of.theta_i_rad, of.delta_phi_rad, of.theta_r_rad]);
+        let pairs = std::iter::zip(own, theirs);
         pairs.map(|(a, b)| a.total_cmp(&b)).fold(Ordering::Equal, Ordering::then)
     }
 

@@ -1,8 +1,6 @@
 //! A curve and its fit: over the incidence, or over the angle of the receiver where source and receiver were in two
 //! directions.
 
-use std::f64::consts::FRAC_PI_2;
-
 use super::material_plot::{FAINTEST_DB, curve_points, fit_layers, incidence_plot};
 use crate::brdf::ThroughBeam;
 use crate::formats::figure::{Plot, Series, Style};
@@ -84,8 +82,8 @@ fn layers(incidence_rad: f64, scan: &Scan, fit: &Fit) -> Vec<Series> {
         points.extend(row.level_sigma0().map(|level| point(*theta_s_rad, row.aspect(), level)));
     }
     let law = ThroughBeam { law: &fit.model, beam_rad: fit.beam_rad().unwrap_or(0.0) };
-    let angles = || scan.iter().map(|(theta_s_rad, _)| *theta_s_rad);
-    let (first, last) = (angles().fold(FRAC_PI_2, f64::min), angles().fold(-FRAC_PI_2, f64::max));
+    // The scan is sorted.
+    let [first, last] = [scan.first(), scan.last()].map(|end| end.map_or(0.0, |end| end.0));
     let fitted = (0..=STEPS).map(|step| {
         let theta_s_rad = first + (last - first) * f64::from(step) / f64::from(STEPS);
         let aspect = Aspect::in_plane(incidence_rad, theta_s_rad);

@@ -138,9 +138,6 @@ pub(super) fn read(
 /// Fits the wanted model to a material's only curve; scenes then render it.
 fn render_model(file: &str, given: &Details, material: &mut Material) -> Result<(), ExchangeError> {
     let [curve] = material.curves.as_slice() else { return Ok(()) };
-    let refuse = |problem: String, way_out: &str| {
-        Err(ExchangeError::in_file(file, FormatError::at("the table", problem, way_out)))
-    };
     let Some((name, model)) = &given.model else {
         if curve.observations.iter().any(Observation::is_retro) {
             return Ok(());
@@ -148,21 +145,25 @@ fn render_model(file: &str, given: &Details, material: &mut Material) -> Result<
         let problem =
             "no row is backscatter, which is all that scenes render of a curve".to_owned();
         let way_out = "name a model that is fitted to it and rendered, as --model mixture-ggx does";
-        return refuse(problem, way_out);
+        return refused(file, problem, way_out);
     };
     let points = match crate::measure::Curve::of_material(curve) {
         Ok(points) => points,
-        Err(error) => return refuse(error.to_string(), "leave that point out"),
+        Err(error) => return refused(file, error.to_string(), "leave that point out"),
     };
     let settings = Fit { beam_rad: curve.illumination.beam_rad, ..Fit::default() };
     let found = match settings.run(model, &points) {
         Ok(found) if found.converged => found,
         Ok(_) => {
             let problem = format!("the fit of {name} did not converge");
-            return refuse(problem, "name another --model");
+            return refused(file, problem, "name another --model");
         }
         Err(error) => {
-            return refuse(format!("{name} cannot be fitted: {error}"), "name another --model");
+            return refused(
+                file,
+                format!("{name} cannot be fitted: {error}"),
+                "name another --model",
+            );
         }
     };
     let mut fit =
@@ -171,6 +172,10 @@ fn render_model(file: &str, given: &Details, material: &mut Material) -> Result<
     material.render = fit.name.clone();
     material.fits.push(fit);
     Ok(())
+}
+
+fn refused(file: &str, problem: String, way_out: &str) -> Result<(), ExchangeError> {
+    Err(ExchangeError::in_file(file, FormatError::at("the table", problem, way_out)))
 }
 
 /// A curve and all that an entry must state about it.

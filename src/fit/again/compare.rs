@@ -154,11 +154,13 @@ fn aspects(curve: &Curve) -> Vec<Aspect> {
     if seen.iter().any(|aspect| !aspect.is_retro()) {
         return seen.iter().copied().step_by(seen.len().div_ceil(ANGLES as usize)).collect();
     }
-    let angles = || seen.iter().map(|aspect| aspect.theta_i_rad);
-    let (low_rad, high_rad) =
-        (angles().fold(f64::INFINITY, f64::min), angles().fold(0.0, f64::max));
-    let share = |angle| f64::from(angle) / f64::from(ANGLES);
-    (0..=ANGLES).map(|angle| Aspect::retro(low_rad + (high_rad - low_rad) * share(angle))).collect()
+    let (mut low_rad, mut high_rad) = (f64::INFINITY, 0.0f64);
+    for aspect in &seen {
+        low_rad = low_rad.min(aspect.theta_i_rad);
+        high_rad = high_rad.max(aspect.theta_i_rad);
+    }
+    let step_rad = (high_rad - low_rad) / f64::from(ANGLES);
+    (0..=ANGLES).map(|angle| Aspect::retro(low_rad + f64::from(angle) * step_rad)).collect()
 }
 
 /// Both covariances: of all numbers found, and of the parameters.
