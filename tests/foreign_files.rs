@@ -303,7 +303,7 @@ fn a_foreign_curve_is_fitted_compared_and_stored() {
     let drawn = fs::read_to_string(at.join("plane.svg")).unwrap();
     assert!(drawn.contains("incidence 1°") && drawn.contains("receiver"));
     let error = refused(at, "fit plane.csv --model lambert --method tls");
-    assert!(error.contains("row 1 (from 0) is not backscatter"), "{error}");
+    assert!(error.contains("row 1 (from 0) source and receiver were in two"), "{error}");
     let near = said(at, "near --curve plane.csv --measured-at 300");
     assert!(near.contains("at 40 angles of the curve"), "{near}");
     let add = "add --from plane.csv --name plane --class paint --kind synthetic --source drawn --licence CC0-1.0 --frequency 300";

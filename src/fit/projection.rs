@@ -72,7 +72,9 @@ impl<'a> Projection<'a> {
         let likelihood = Likelihood::coarse(coordinates, &sample(rows), noise_w);
         let looks = looks(coordinates).into_iter();
         let laws = looks.map(|looks| (looks, GammaLaw::new(looks))).collect();
-        Projection { coordinates, likelihood, parts: Parts::of(coordinates, rows), laws }
+        // A permittivity is an amplitude nearly enough to start from, also where two directions tell more of it.
+        let parts = Parts::of(coordinates, &[]);
+        Projection { coordinates, likelihood, parts, laws }
     }
 
     /// Up to `count` starts from one half of the places, 0 or 1, the best first; `factor` times as many places as usual
