@@ -10,8 +10,8 @@ use std::f64::consts::PI;
 use serde::Serialize;
 
 use crate::frames::{Direction, Surface};
-use crate::measure::Curve;
 use crate::material::file::in_plane::InPlane;
+use crate::measure::Curve;
 use crate::units::{db_from_ratio, ratio_from_db};
 
 /// What a curve is measured over.
