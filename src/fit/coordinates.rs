@@ -330,8 +330,8 @@ impl Coordinates {
     }
 
     /// ln σ⁰ of the model at a point of the search, as the beam sees it.
-    pub(super) fn table(&self, at: &DVector<f64>, angles: &Aspects) -> Table {
-        Table::new(&self.model(at), self.beam_rad, angles)
+    pub(super) fn table(&self, at: &DVector<f64>, aspects: &Aspects) -> Table {
+        Table::new(&self.model(at), self.beam_rad, aspects)
     }
 
     /// The chosen k, where backscatter does not determine it; `None` for a model without such a gauge.

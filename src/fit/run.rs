@@ -341,14 +341,16 @@ mod tests {
             for (receiver_deg, place) in (-80..=80i32).step_by(2).zip(0u32..) {
                 let chirp = 1000 * chirp + place;
                 let key = Key { seed: 3, chirp: chirp.into(), sub_ray: 0, purpose: Purpose::Fit };
+                let theta_i_rad = incidence_deg.to_radians();
+                let aspect = Aspect::in_plane(theta_i_rad, f64::from(receiver_deg).to_radians());
                 let row = Observation {
-                    theta_r_rad: f64::from(receiver_deg.abs()).to_radians(),
-                    delta_phi_rad: if receiver_deg > 0 { std::f64::consts::PI } else { 0.0 },
+                    theta_r_rad: aspect.theta_r_rad,
+                    delta_phi_rad: aspect.delta_phi_rad,
                     chirp: Some(chirp),
-                    ..Observation::backscatter(incidence_deg.to_radians(), Some(1.0), None)
+                    ..Observation::backscatter(theta_i_rad, Some(1.0), None)
                 };
                 let noise = 1.0 + key.draws().complex_gaussian().re * (2.0 / looks).sqrt();
-                let sigma0 = row.aspect().sigma0(law) * noise.max(0.1);
+                let sigma0 = aspect.sigma0(law) * noise.max(0.1);
                 rows.push(Observation { sigma0: Some(sigma0), ..row });
             }
         }
@@ -375,8 +377,7 @@ mod tests {
             assert!((found / truth).ln().abs() < 0.1, "{found} {truth}");
         }
         assert!((found.looks.unwrap() / 100.0).ln().abs() < 0.5, "{:?}", found.looks);
-        let mirror =
-            Aspect { theta_i_rad: 0.5, theta_r_rad: 0.5, delta_phi_rad: std::f64::consts::PI };
+        let mirror = Aspect::in_plane(0.5, 0.5);
         let Band { low, mid, high } = found.band_of(mirror);
         let level = mirror.sigma0(&truth);
         assert!(low < mid && mid < high && (level / mid).ln().abs() < 2.0 * (high / mid).ln());

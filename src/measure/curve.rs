@@ -98,7 +98,7 @@ impl Curve {
     /// # Errors
     /// The first cell that cannot be used, with its line and column.
     pub fn read_as(bytes: &[u8], names: &ColumnNames) -> Result<(Curve, Vec<String>), FormatError> {
-        let Points { rows, illumination, passed_over, notices, .. } = points(bytes, names)?;
+        let Points { rows, illumination, passed_over, notices } = points(bytes, names)?;
         let notices: Vec<String> = passed_over.into_iter().chain(notices).collect();
         let mut observations = Vec::new();
         for (index, (line, point)) in rows.iter().enumerate() {
