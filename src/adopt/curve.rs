@@ -5,7 +5,7 @@ use super::provenance::{add_source, free_key};
 use crate::catalogue::exchange::Detail;
 use crate::error::Error;
 use crate::material::form::is_licence;
-use crate::material::{Curve, Instrument, Material, SourceKind};
+use crate::material::{Curve, Instrument, Material, Observation, SourceKind};
 use crate::measure;
 
 /// What is stated of a curve that is to be stored: where it comes from and what it was measured with.
@@ -208,16 +208,35 @@ pub fn add_curve(
             "name another instrument, with its frequency and its threshold",
         ));
     }
+    if let Some((problem, way_out)) = admission::strange_frequency(material, &curve) {
+        return Err(Error::usage(problem, way_out));
+    }
     material.curves.push(curve);
     Ok(AddedCurve { curve: name.to_owned(), source })
 }
 
 /// The curve of a material that has these points.
 fn same_points<'a>(material: &'a Material, curve: &measure::Curve) -> Option<&'a Curve> {
-    material
-        .curves
-        .iter()
-        .find(|known| measure::Curve::of_material(known).is_ok_and(|known| known == *curve))
+    let is_same = |known: &measure::Curve| {
+        let rows = || known.observations.iter().zip(&curve.observations);
+        known.illumination == curve.illumination
+            && known.observations.len() == curve.observations.len()
+            && rows().all(|(known, row)| is_same_point(known, row))
+    };
+    let mut known = material.curves.iter();
+    known.find(|known| measure::Curve::of_material(known).is_ok_and(|known| is_same(&known)))
+}
+
+/// Whether two points differ in nothing that both state: earlier versions stored numbers that a file did not have.
+fn is_same_point(known: &Observation, row: &Observation) -> bool {
+    let with = |one: &Observation, other: &Observation| Observation {
+        theta_sd_rad: one.theta_sd_rad.or(other.theta_sd_rad),
+        power_w: one.power_w.or(other.power_w),
+        range_m: one.range_m.or(other.range_m),
+        chirp: one.chirp.or(other.chirp),
+        ..*one
+    };
+    with(known, row) == with(row, known)
 }
 
 /// The curve or the fit of a material that has this name, in words.

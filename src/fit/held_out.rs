@@ -136,7 +136,7 @@ impl Blocks {
 
     fn in_time(rows: &[Observation]) -> Blocks {
         let mut in_time: Vec<usize> = (0..rows.len()).collect();
-        in_time.sort_by_key(|&row| rows[row].chirp);
+        in_time.sort_by_key(|&row| rows[row].chirp.map_or(row, |chirp| chirp as usize));
         let angles_rad: Vec<f64> = in_time.iter().map(|&row| rows[row].theta_i_rad).collect();
         let is_sweep = angles_rad.is_sorted() || angles_rad.iter().rev().is_sorted();
         let blocks = if is_sweep { rows.len() } else { RUNS.min(rows.len()) };

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::{MaterialError, value};
 use super::form::is_hash;
+use crate::radar::speckle::mean_offset_db;
 
 /// The record of one fit to one curve.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -120,14 +121,16 @@ pub struct Goodness {
     pub rows: u32,
 }
 
-impl Goodness {
-    /// How far the form of the law is off, dB rms: what speckle does not explain of the scatter about it. 0 where that is
-    /// no more than chance leaves in so many independent rows, two standard deviations of their variance; none where the
-    /// speckle is not known.
+impl FitReport {
+    /// How far the form of the law is off, dB rms: what speckle does not explain of the scatter about it, whose mean in
+    /// dB is below that of the power. 0 where that is no more than chance leaves in so many independent rows, two
+    /// standard deviations of their variance; none where the speckle is not known.
     pub fn form_error_db(&self) -> Option<f64> {
-        let noise_db2 = self.speckle_db?.powi(2);
-        let beyond_db2 = self.rms_db.powi(2) - noise_db2;
-        let chance_db2 = 2.0 * noise_db2 * (2.0 / f64::from(self.rows.max(1))).sqrt();
+        let Goodness { rms_db, mean_db, speckle_db, rows, .. } = self.goodness;
+        let noise_db2 = speckle_db?.powi(2);
+        let form_mean_db = mean_db - mean_offset_db(self.looks?);
+        let beyond_db2 = rms_db.powi(2) - mean_db.powi(2) + form_mean_db.powi(2) - noise_db2;
+        let chance_db2 = 2.0 * noise_db2 * (2.0 / f64::from(rows.max(1))).sqrt();
         Some(if beyond_db2 > chance_db2 { beyond_db2.sqrt() } else { 0.0 })
     }
 }
@@ -228,21 +231,32 @@ mod tests {
 
     #[test]
     fn the_error_of_a_form_is_what_speckle_leaves_unexplained() {
-        let goodness = |rms_db, rows| Goodness {
-            rms_db,
-            mean_db: 0.0,
-            speckle_db: Some(3.0),
-            z_mean: 0.0,
-            z_variance: 1.0,
-            ks_distance: 0.0,
-            rows,
+        let speckle_mean_db = mean_offset_db(1.0);
+        let form_error_db = |deviation_db: f64, mean_db: f64, rows, speckle_db| {
+            let goodness = Goodness {
+                rms_db: deviation_db.hypot(mean_db),
+                mean_db,
+                speckle_db,
+                z_mean: 0.0,
+                z_variance: 1.0,
+                ks_distance: 0.0,
+                rows,
+            };
+            FitReport { goodness, ..report() }.form_error_db()
         };
-        assert_eq!(goodness(5.0, 200).form_error_db(), Some(4.0));
+        let beside = |deviation_db, rows| {
+            form_error_db(deviation_db, speckle_mean_db, rows, Some(3.0)).unwrap()
+        };
+        assert!((beside(5.0, 200) - 4.0).abs() < 1e-9);
         // 200 rows: the variance scatters by a tenth.
-        assert_eq!(goodness(3.2, 200).form_error_db(), Some(0.0));
-        assert!(goodness(3.2, 20_000).form_error_db().is_some_and(|db| (db - 1.1136).abs() < 1e-3));
-        assert_eq!(goodness(2.0, 200).form_error_db(), Some(0.0));
-        assert_eq!(Goodness { speckle_db: None, ..goodness(5.0, 200) }.form_error_db(), None);
+        assert_eq!(beside(3.2, 200), 0.0);
+        assert!((beside(3.2, 20_000) - 1.1136).abs() < 1e-3);
+        assert_eq!(beside(2.0, 200), 0.0);
+        // The mean of a right law lies where speckle has it: 2.5 dB below that of the power.
+        let off_db = form_error_db(3.0, speckle_mean_db + 2.0, 20_000, Some(3.0)).unwrap();
+        assert!((off_db - 2.0).abs() < 1e-9, "{off_db}");
+        assert!(form_error_db(3.0, 0.0, 20_000, Some(3.0)).unwrap() > 2.5);
+        assert_eq!(form_error_db(5.0, 0.0, 200, None), None);
     }
 
     fn report() -> FitReport {

@@ -32,8 +32,8 @@ pub const COLUMNS: [&str; 9] = [
 /// A curve: observations in any order, each with a σ⁰ or the limit that it stayed below.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Curve {
-    /// One per chirp. Those that [`Curve::read`] and [`Curve::of_material`] give leave out nothing but
-    /// the place on the target; a detection has a threshold where only detections were recorded, and none otherwise.
+    /// One per chirp. Of those that [`Curve::read`] and [`Curve::of_material`] give, a detection has a threshold where
+    /// only detections were recorded, and none otherwise.
     pub observations: Vec<Observation>,
     /// How the target was lit, as far as it is stated.
     pub illumination: Illumination,
@@ -68,20 +68,22 @@ pub enum ObservationError {
 }
 
 impl Curve {
-    /// A material's curve. What an observation leaves out is as in [`Curve::read`].
+    /// A material's curve.
     ///
     /// # Errors
     /// The first observation that does not belong in a curve.
     pub fn of_material(curve: &material::Curve) -> Result<Curve, ObservationError> {
         let illumination = curve.illumination;
-        let completed = curve.observations.iter().enumerate();
-        let completed = completed.map(|(index, o)| complete(index, o, illumination.only_detected));
-        Ok(Curve { observations: completed.collect::<Result<_, _>>()?, illumination })
+        let rows = curve.observations.iter().enumerate();
+        let rows = rows.map(|(index, o)| checked(index, o, illumination.only_detected));
+        Ok(Curve { observations: rows.collect::<Result<_, _>>()?, illumination })
     }
 
-    /// Whether no observation has a power of its own, but σ⁰ in its place.
+    /// Whether an observation has no power, or all have σ⁰ in its place, as earlier versions stored it.
     pub fn lacks_power(&self) -> bool {
-        self.observations.iter().all(|o| o.power_w.is_none() || o.power_w == o.level_sigma0())
+        let rows = &self.observations;
+        rows.iter().any(|o| o.power_w.is_none())
+            || rows.iter().all(|o| o.power_w == o.level_sigma0())
     }
 
     /// Reads a curve file, see [`Curve::read_as`], whose columns have our names.
@@ -92,18 +94,32 @@ impl Curve {
         Ok(Curve::read_as(bytes, &ColumnNames::default())?.0)
     }
 
-    /// Reads a curve file ([`points`]), and what a person should know of it. Without a column a row is uncensored, its angle
-    /// exact, its range 0, its power σ⁰ in watts, its chirp its number from 0.
+    /// Reads a curve file ([`points`]), and what a person should know of it. What a row does not state stays open; a fit
+    /// takes its angle for exact, its power for σ⁰ in watts and its chirp for its number from 0.
     ///
     /// # Errors
     /// The first cell that cannot be used, with its line and column.
     pub fn read_as(bytes: &[u8], names: &ColumnNames) -> Result<(Curve, Vec<String>), FormatError> {
-        let Points { rows, illumination, passed_over, notices } = points(bytes, names)?;
+        let table = points(bytes, names)?;
+        let has_deviations = table.sd_db.iter().any(Option::is_some);
+        let (curve, mut notices) = Curve::of_points(table)?;
+        if has_deviations {
+            notices.push("the deviations in `sd_db` are not used here: speckle says how far a level scatters".to_owned());
+        }
+        Ok((curve, notices))
+    }
+
+    /// The curve of a table, and what a person should know of it. Deviations of levels have no place in a curve.
+    ///
+    /// # Errors
+    /// A row that does not belong in a curve, with its line.
+    pub fn of_points(points: Points) -> Result<(Curve, Vec<String>), FormatError> {
+        let Points { rows, illumination, passed_over, notices, .. } = points;
         let notices: Vec<String> = passed_over.into_iter().chain(notices).collect();
         let mut observations = Vec::new();
         for (index, (line, point)) in rows.iter().enumerate() {
-            let completed = complete(index, point, illumination.only_detected);
-            observations.push(completed.map_err(|error| {
+            let row = checked(index, point, illumination.only_detected);
+            observations.push(row.map_err(|error| {
                 let problem = match error {
                     ObservationError::AboveRange { .. } => {
                         "the row is above the instrument's range"
@@ -134,8 +150,10 @@ impl Curve {
             names = format!(",theta_r_deg,delta_phi_deg{names}");
         }
         let mut text = format!("{}{names}\n", COLUMNS.join(","));
-        for (index, o) in self.observations.iter().enumerate() {
-            let sigma0 = o.level_sigma0().unwrap_or(f64::NAN);
+        for o in &self.observations {
+            let cell = |value: Option<f64>, decimals| {
+                value.map_or(String::new(), |value| format!("{value:.decimals$}"))
+            };
             let [xt_m, yt_m] = o.target_m.map_or_else(Default::default, |place| {
                 place.map(|metres| format!("{:.5}", metres + 0.0))
             });
@@ -148,13 +166,13 @@ impl Curve {
                 String::new()
             };
             text += &format!(
-                "{:.4},{:.4},{:.3},{:.3},{:.5},{},{},{xt_m},{yt_m}{aspect}{limit}{lit}\n",
+                "{:.4},{},{},{},{},{},{},{xt_m},{yt_m}{aspect}{limit}{lit}\n",
                 o.theta_i_rad.to_degrees(),
-                o.theta_sd_rad.unwrap_or(0.0).to_degrees(),
-                dbm_from_watts(o.power_w.unwrap_or(sigma0)),
-                db_from_ratio(sigma0),
-                o.range_m.unwrap_or(0.0),
-                o.chirp.unwrap_or(index as u32),
+                cell(o.theta_sd_rad.map(f64::to_degrees), 4),
+                cell(o.power_w.map(dbm_from_watts), 3),
+                cell(o.level_sigma0().map(db_from_ratio), 3),
+                cell(o.range_m, 5),
+                o.chirp.map_or(String::new(), |chirp| chirp.to_string()),
                 u8::from(o.is_censored()),
             );
         }
@@ -179,25 +197,18 @@ pub(crate) fn level_sigma0(index: usize, o: &Observation) -> Result<f64, Observa
     o.level_sigma0().ok_or(ObservationError::Empty { point })
 }
 
-/// An observation with the defaults of [`Curve::read`] for what it leaves out.
-fn complete(
+/// An observation that belongs in a curve. A limit that says nothing of it is left out.
+fn checked(
     index: usize,
     o: &Observation,
     only_detected: bool,
 ) -> Result<Observation, ObservationError> {
-    let sigma0 = level_sigma0(index, o)?;
+    level_sigma0(index, o)?;
     let threshold_sigma0 = o.threshold_sigma0.filter(|_| only_detected || o.is_censored());
     if only_detected && threshold_sigma0.is_none() {
         return Err(ObservationError::NoThreshold { point: index + 1 });
     }
-    Ok(Observation {
-        threshold_sigma0,
-        theta_sd_rad: o.theta_sd_rad.or(Some(0.0)),
-        power_w: o.power_w.or(Some(sigma0)),
-        range_m: o.range_m.or(Some(0.0)),
-        chirp: o.chirp.or(Some(index as u32)),
-        ..*o
-    })
+    Ok(Observation { threshold_sigma0, ..*o })
 }
 
 #[cfg(test)]
@@ -281,9 +292,10 @@ mod tests {
     #[test]
     fn two_columns_are_enough() {
         let curve = Curve::read(b"theta_deg,sigma0_db\n0,-3\n45,-20\n").unwrap();
-        assert_eq!(curve.observations[1].chirp, Some(1));
-        let second = &curve.observations[1];
-        assert!(!second.is_censored() && second.theta_sd_rad == Some(0.0));
+        let stated = Observation::backscatter(45f64.to_radians(), Some(0.01), None);
+        assert_eq!(curve.observations[1], stated, "nothing is made up");
+        let written = String::from_utf8(curve.write()).unwrap();
+        assert!(written.ends_with("45.0000,,,-20.000,,,0,,\n"), "{written}");
     }
 
     #[test]

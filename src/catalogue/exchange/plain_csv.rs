@@ -1,8 +1,9 @@
 //! One material's curve as CSV, the columns that a `material.toml` refers to: `theta_deg`, `sigma0_db`,
-//! `censor`, `threshold_db`, `theta_r_deg`, `delta_phi_deg`, and `footprint` and `beam_rad` where they are stated.
+//! `censor`, `threshold_db`, `theta_r_deg`, `delta_phi_deg`, and where they are stated `theta_sd_deg`, `power_dbm`,
+//! `range_m`, `chirp`, `xt_m`, `yt_m`, `footprint` and `beam_rad`.
 //! Lines that start with `#` describe the curve and its source; the reader skips those at the head.
 //!
-//! Lost: everything but the curve, and of its points the angle's deviation, power, range, chirp and place.
+//! Lost: everything but the curve.
 
 use std::path::Path;
 
@@ -18,7 +19,7 @@ use crate::material::{
     Citation, Curve, Illumination, Instrument, Material, Observation, Slug, Source, SourceKind,
     Status, file,
 };
-use crate::units::{db_from_ratio, shown};
+use crate::units::{db_from_ratio, dbm_from_watts, shown};
 
 /// Key of the instrument that a curve was measured with.
 pub(super) const RADAR: &str = "radar";
@@ -30,10 +31,19 @@ pub(super) fn write(subject: &Subject, name: &str) -> Export {
     text += &format!("# {}, at {} GHz\n", describe(&points), points.frequency_hz / 1e9);
     let lit = points.curve.map(|curve| curve.illumination).unwrap_or_default();
     let [names, lit] = lit.columns();
-    text += &format!("theta_deg,sigma0_db,censor,threshold_db,theta_r_deg,delta_phi_deg{names}\n");
+    let stated: Vec<&Detailed> = DETAILS
+        .iter()
+        .filter(|detail| points.observations.iter().any(|point| (detail.of)(point).is_some()))
+        .collect();
+    text += "theta_deg,sigma0_db,censor,threshold_db,theta_r_deg,delta_phi_deg";
+    stated.iter().for_each(|detail| text += &format!(",{}", detail.column));
+    text += &format!("{names}\n");
     for point in points.observations.iter() {
+        let details = stated.iter().map(|detail| (detail.of)(point).map(fifteen_digits));
+        let details: String =
+            details.map(|cell| format!(",{}", cell.unwrap_or_default())).collect();
         text += &format!(
-            "{},{},{},{},{},{}{lit}\n",
+            "{},{},{},{},{},{}{details}{lit}\n",
             fifteen_digits(point.theta_i_rad.to_degrees()),
             level_db(point.sigma0),
             point.censor.as_str(),
@@ -48,6 +58,22 @@ pub(super) fn write(subject: &Subject, name: &str) -> Export {
     );
     Export { files: vec![(name.to_owned(), text.into_bytes())], lost }
 }
+
+/// What a point may state besides its angles and its level.
+struct Detailed {
+    column: &'static str,
+    /// In the unit of the column.
+    of: fn(&Observation) -> Option<f64>,
+}
+
+const DETAILS: [Detailed; 6] = [
+    Detailed { column: "theta_sd_deg", of: |point| point.theta_sd_rad.map(f64::to_degrees) },
+    Detailed { column: "power_dbm", of: |point| point.power_w.map(dbm_from_watts) },
+    Detailed { column: "range_m", of: |point| point.range_m },
+    Detailed { column: "chirp", of: |point| point.chirp.map(f64::from) },
+    Detailed { column: "xt_m", of: |point| point.target_m.map(|[x, _]| x) },
+    Detailed { column: "yt_m", of: |point| point.target_m.map(|[_, y]| y) },
+];
 
 /// A level in dB; nothing where there is none.
 fn level_db(level: Option<f64>) -> String {

@@ -8,7 +8,8 @@
 //! f = 0 with the limit as `uBRDF`, one above the range has the limit as f, and `adhoc_variables` says
 //! `censor` and `threshold_brdf` for every point.
 //!
-//! Lost: fits, effects, permittivities, layers, findings, and every curve but one. The instrument is
+//! Lost: fits, effects, permittivities, layers, findings, every curve but one, and of its points the power, range, chirp,
+//! place and angle error. The instrument is
 //! in `adhoc_section`, because the format wants lamp and photodiode. Postal address and e-mail, which
 //! it demands, are not known here and say so.
 
@@ -34,8 +35,8 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Export, ExchangeErr
     let text = serde_json::to_string_pretty(&file);
     let text = text.map_err(|error| ExchangeError::encoding("JSON", error))? + "\n";
     let lost = format!(
-        "the file holds {}; fits, effects, permittivities and layers have no place in the format, and \
-         a detection limit only in adhoc_variables",
+        "the file holds {}; fits, effects, permittivities and layers have no place in the format, nor have the power, \
+         range, chirp, place and angle error of a point, and a detection limit has one only in adhoc_variables",
         describe(&points)
     );
     Ok(Export { files: vec![(name.to_owned(), text.into_bytes())], lost })

@@ -8,9 +8,7 @@ use super::residuals;
 use super::words::grouped;
 use crate::brdf::Parameter;
 use crate::formats::words::{as_typed, digits};
-use crate::material::{
-    ChosenBy, CrossValidation, Fit, FitNumber, FitReport, Goodness, Material, SourceKind,
-};
+use crate::material::{ChosenBy, CrossValidation, Fit, FitNumber, FitReport, Material, SourceKind};
 use crate::units::dbm_from_watts;
 
 /// Parameters that backscatter sees only inside a product, and the product's name.
@@ -222,8 +220,8 @@ fn held_out(held: &CrossValidation) -> String {
 }
 
 /// How far the form of the law is off, which no band holds.
-fn form_error(goodness: &Goodness) -> String {
-    match goodness.form_error_db() {
+fn form_error(report: &FitReport) -> String {
+    match report.form_error_db() {
         Some(0.0) => "no more than the noise hides".to_owned(),
         Some(db) => format!("{db:.2} dB rms beyond the noise; the band does not hold it"),
         None => "not known: no noise is stated".to_owned(),
@@ -251,7 +249,7 @@ fn report(report: &FitReport) -> ReportView {
         ("Noise floor", noise),
         ("Set, not found", if given.is_empty() { "nothing".to_owned() } else { given.join(", ") }),
         ("Detections off the model", format!("{:.2} dB rms{speckle}", g.rms_db)),
-        ("The form of the law is off", form_error(g)),
+        ("The form of the law is off", form_error(report)),
         (
             "Residuals against their law",
             format!(

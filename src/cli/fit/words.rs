@@ -57,7 +57,7 @@ pub fn report(report: &FitReport) -> String {
     }
     text += &estimates(report);
     text += &level(report);
-    text += &goodness(&report.goodness);
+    text += &goodness(report);
     text += &report.held_out.as_ref().map_or(String::new(), held_out);
     let singular: Vec<String> = report.singular_values.iter().map(|v| significant(*v, 4)).collect();
     text += &format!("singular values: {}\n", singular.join(", "));
@@ -105,12 +105,12 @@ fn level(report: &FitReport) -> String {
     format!("looks {looks}, noise floor {noise}\n")
 }
 
-fn goodness(goodness: &Goodness) -> String {
-    let Goodness { rms_db, mean_db, z_mean, z_variance, ks_distance, .. } = *goodness;
-    let speckle = goodness
-        .speckle_db
+fn goodness(report: &FitReport) -> String {
+    let Goodness { rms_db, mean_db, speckle_db, z_mean, z_variance, ks_distance, .. } =
+        report.goodness;
+    let speckle = speckle_db
         .map_or(String::new(), |speckle_db| format!(" (speckle alone leaves {speckle_db:.2} dB)"));
-    let form = goodness.form_error_db().filter(|db| *db > 0.0).map_or(String::new(), |db| {
+    let form = report.form_error_db().filter(|db| *db > 0.0).map_or(String::new(), |db| {
         format!("the form of the law is off by {db:.2} dB rms, which is not in the deviations\n")
     });
     format!(

@@ -104,7 +104,8 @@ const SIZE: f64 = 1.2816;
 impl Points {
     /// The points of a backscatter curve. Where angles are repeated, twice or more on average, and all were detected, they
     /// become points of their mean level. Rows at grazing incidence, where σ⁰ does not determine f, are left out.
-    pub fn backscatter(curve: &Curve, noise_db: Option<f64>) -> Points {
+    /// `sd_db` is what the file states of the deviation of each level.
+    pub fn backscatter(curve: &Curve, sd_db: &[Option<f64>], noise_db: Option<f64>) -> Points {
         const GRAZING_RAD: f64 = 1.569;
         let mut points: Vec<Point> = curve
             .observations
@@ -132,13 +133,14 @@ impl Points {
         // Angles of single chirps coincide by chance.
         let are_repeats = points.len() >= 2 * groups.len();
         if !are_repeats || points.iter().any(|point| point.censored) {
-            return Points::new(Kind::Backscatter, points, noise_db, None);
+            return Points::new(Kind::Backscatter, points, noise_db, stated(sd_db));
         }
-        Points::of_groups(Kind::Backscatter, groups, noise_db, None)
+        Points::of_groups(Kind::Backscatter, groups, noise_db, stated(sd_db))
     }
 
     /// The points of values in the plane of incidence; repeats become their mean level.
     pub fn in_plane(values: &[InPlane], noise_db: Option<f64>) -> Points {
+        let sd_db: Vec<Option<f64>> = values.iter().map(|value| value.sd_db).collect();
         let mut places: BTreeMap<[i64; 2], Vec<Point>> = BTreeMap::new();
         for value in values {
             let key = [value.theta_i_rad, value.theta_s_rad].map(place);
@@ -154,7 +156,7 @@ impl Points {
             scan = Some((key[0], number));
             group.iter_mut().for_each(|point| point.scan = number);
         }
-        Points::of_groups(Kind::InPlane, places.into_values().collect(), noise_db, stated(values))
+        Points::of_groups(Kind::InPlane, places.into_values().collect(), noise_db, stated(&sd_db))
     }
 
     /// The points of these groups of repeats, each the mean of its levels.
@@ -308,8 +310,8 @@ fn repeats(levels: &[Vec<f64>]) -> Option<Noise> {
 }
 
 /// Noise that the file states.
-fn stated(values: &[InPlane]) -> Option<Noise> {
-    let known: Option<Vec<f64>> = values.iter().map(|value| value.sd_db).collect();
+fn stated(sd_db: &[Option<f64>]) -> Option<Noise> {
+    let known: Option<Vec<f64>> = sd_db.iter().copied().collect();
     let known = known.filter(|known| !known.is_empty())?;
     let square = known.iter().map(|sd| sd * sd).sum::<f64>() / known.len() as f64;
     Some(Noise { sd_db: square.sqrt(), freedom: f64::INFINITY, source: NoiseSource::File })

@@ -215,7 +215,7 @@ fn backscatter_of(
             db_from_ratio(sigma0(theta_deg.to_radians())) + noise_db * testing::normal(k);
         text += &format!("{theta_deg},{level_db:.4}\n");
     }
-    Points::backscatter(&Curve::read(text.as_bytes()).unwrap(), Some(noise_db))
+    Points::backscatter(&Curve::read(text.as_bytes()).unwrap(), &[], Some(noise_db))
 }
 
 /// A backscatter curve every half degree, with a threshold.
@@ -230,7 +230,7 @@ fn backscatter(threshold_db: f64, extra: impl Fn(f64) -> f64) -> Points {
         let censored = u8::from(level_db < threshold_db);
         text += &format!("{theta_deg},{:.3},{censored}\n", level_db.max(threshold_db));
     }
-    Points::backscatter(&Curve::read(text.as_bytes()).unwrap(), Some(NOISE_DB))
+    Points::backscatter(&Curve::read(text.as_bytes()).unwrap(), &[], Some(NOISE_DB))
 }
 
 #[test]
@@ -254,7 +254,7 @@ fn two_runs(apart_db: f64) -> Points {
         let level_db = level_db + NOISE_DB * testing::normal(k) + apart_db * (k / 80) as f64;
         text += &format!("{theta_deg},{level_db:.4}\n");
     }
-    Points::backscatter(&Curve::read(text.as_bytes()).unwrap(), None)
+    Points::backscatter(&Curve::read(text.as_bytes()).unwrap(), &[], None)
 }
 
 #[test]

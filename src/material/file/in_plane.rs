@@ -9,8 +9,9 @@
 //! Also read are the isotropic tables of optical design programs (`.bsdf`), whose angles are counted from
 //! the mirror direction: azimuth 0 leads towards the normal and past it, 180° away from it.
 
-use crate::formats::csv::{Names, Table};
-use crate::formats::{ColumnNames, FormatError};
+use crate::formats::FormatError;
+use crate::formats::csv::Table;
+use crate::formats::words::counted;
 use crate::material::{Aspect, Observation};
 
 /// One measured value.
@@ -29,45 +30,8 @@ pub struct InPlane {
 /// Grazing directions say nothing of a surface, degrees.
 const GRAZING_DEG: f64 = 89.9;
 
-/// Columns of a table.
-const REQUIRED: [&str; 3] = ["theta_i_deg", "theta_s_deg", "brdf_per_sr"];
-const OPTIONAL: [&str; 2] = ["sd_db", "blank_per_sr"];
 /// Values that are no slip, 1/sr.
-const VALUES_PER_SR: (f64, f64) = (1e-30, 1e30);
-
-/// Reads the table, whose columns have these names of ours, and what a person should know of it.
-///
-/// # Errors
-/// The first cell that cannot be used, with its line and column.
-pub fn read_table(
-    bytes: &[u8],
-    names: &ColumnNames,
-) -> Result<(Vec<InPlane>, Vec<String>), FormatError> {
-    let mut table = Table::parse(bytes, Names::InFirstLine)?;
-    table.rename(names)?;
-    table.lower_case();
-    table.check(&REQUIRED)?;
-    let known: Vec<&str> = REQUIRED.iter().chain(&OPTIONAL).copied().collect();
-    let mut notices: Vec<String> = table.passed_over(&known).into_iter().collect();
-    let mut found = Vec::with_capacity(table.len());
-    for row in 0..table.len() {
-        let point = read_row(&table, row)?;
-        let blank = table.number_within(row, "blank_per_sr", VALUES_PER_SR)?;
-        if blank.is_none_or(|blank| point.f_per_sr > blank) {
-            found.push(point);
-        }
-    }
-    let below = table.len() - found.len();
-    if below > 0 && found.is_empty() {
-        let problem = "no value is above its blank, so that nothing was measured";
-        return Err(FormatError::at("the table", problem, "check which column is the blank"));
-    }
-    if below > 0 {
-        let all = table.len();
-        notices.push(format!("{below} of {all} values are not above their blank and are left out"));
-    }
-    Ok((found, notices))
-}
+pub(super) const VALUES_PER_SR: (f64, f64) = (1e-30, 1e30);
 
 impl InPlane {
     /// The value as a point of a curve.
@@ -101,14 +65,7 @@ pub fn is_bsdf(bytes: &[u8]) -> bool {
     first_words.any(|first| words.iter().any(|word| word.as_bytes() == first))
 }
 
-/// Whether the bytes are a table of bistatic values, by its header.
-pub fn is_table(bytes: &[u8], names: &ColumnNames) -> bool {
-    let Ok(mut table) = Table::parse(bytes, Names::InFirstLine) else { return false };
-    let renamed = table.rename(names).is_ok();
-    table.lower_case();
-    renamed && table.has("theta_s_deg")
-}
-
+/// A row of a table.
 pub(super) fn read_row(table: &Table, row: usize) -> Result<InPlane, FormatError> {
     let sd_db = table.number_within(row, "sd_db", (1e-6, 100.0))?;
     let theta_i_deg = table.required_within(row, "theta_i_deg", (0.0, GRAZING_DEG))?;
@@ -121,12 +78,12 @@ pub(super) fn read_row(table: &Table, row: usize) -> Result<InPlane, FormatError
     })
 }
 
-/// Reads the plane of incidence of a `.bsdf` table at its first sample rotation; zeros, which stand
-/// for nothing measured, are left out.
+/// Reads the plane of incidence of a `.bsdf` table at its first sample rotation, and what a person should know of it; zeros,
+/// which stand for nothing measured, are left out, and so are values below zero.
 ///
 /// # Errors
-/// What is missing or cannot be read, with its line.
-pub fn read_bsdf(bytes: &[u8]) -> Result<Vec<InPlane>, FormatError> {
+/// What is missing, too much or cannot be read, with its line; a table of transmission or of colours.
+pub fn read_bsdf(bytes: &[u8]) -> Result<(Vec<InPlane>, Vec<String>), FormatError> {
     let text = String::from_utf8_lossy(bytes);
     let mut lines = text
         .lines()
@@ -135,6 +92,7 @@ pub fn read_bsdf(bytes: &[u8]) -> Result<Vec<InPlane>, FormatError> {
         .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
     let header = Header::read(&mut lines)?;
     let mut found = Vec::new();
+    let mut negative = 0;
     // A block for each angle of incidence: the total, then a row for each azimuth.
     for &incidence_deg in &header.incidences_deg {
         match lines.next() {
@@ -157,6 +115,7 @@ pub fn read_bsdf(bytes: &[u8]) -> Result<Vec<InPlane>, FormatError> {
                 // Both rows of the plane contain the mirror direction.
                 if towards < 0.0 || radial_deg != 0.0 {
                     let theta_s_deg = incidence_deg + towards * radial_deg;
+                    negative += usize::from(f_per_sr < 0.0);
                     found.extend(in_plane(incidence_deg, theta_s_deg, f_per_sr));
                 }
             }
@@ -167,7 +126,27 @@ pub fn read_bsdf(bytes: &[u8]) -> Result<Vec<InPlane>, FormatError> {
         let way_out = "give the azimuths 0 and 180, and values above 0";
         return Err(FormatError::at("the file", problem, way_out));
     }
-    Ok(found)
+    let mut notices = Vec::new();
+    let mut behind = lines.filter(|(_, line)| !line.starts_with("DataEnd"));
+    match (header.rotations_deg.as_slice(), behind.next()) {
+        ([first, _, ..], _) => {
+            notices.push(format!(
+                "of {} rotations of the sample that at {first}° is read",
+                header.rotations_deg.len()
+            ));
+        }
+        (_, Some((number, _))) => {
+            let problem = "something stands behind the last block";
+            let way_out = "give the angles of all blocks in the header";
+            return Err(FormatError::at(format!("line {number}"), problem, way_out));
+        }
+        (_, None) => {}
+    }
+    if negative > 0 {
+        let values = counted(negative, "value");
+        notices.push(format!("{values} below zero, which no surface has, are left out"));
+    }
+    Ok((found, notices))
 }
 
 fn in_plane(theta_i_deg: f64, theta_s_deg: f64, f_per_sr: f64) -> Option<InPlane> {
@@ -185,7 +164,12 @@ struct Header {
     incidences_deg: Vec<f64>,
     azimuths_deg: Vec<f64>,
     radials_deg: Vec<f64>,
+    rotations_deg: Vec<f64>,
 }
+
+/// Words of a header whose tables are something else than the reflection at one wavelength.
+const OTHER_TABLES: [(&str, &str); 2] =
+    [("BTDF", "this is a table of transmission"), ("XYZ", "this is a table of three colours")];
 
 impl Header {
     /// Reads up to the line `DataBegin`.
@@ -194,8 +178,14 @@ impl Header {
         loop {
             let Some((number, line)) = lines.next() else { return Err(missing("DataBegin")) };
             let words: Vec<&str> = line.split_whitespace().collect();
+            if let Some((_, problem)) = OTHER_TABLES.iter().find(|(other, _)| words.contains(other))
+            {
+                let way_out = "give the BRDF at one wavelength";
+                return Err(FormatError::at(format!("line {number}"), *problem, way_out));
+            }
             let axis = match words.first().copied() {
                 Some("DataBegin") => break,
+                Some("SampleRotation") => &mut header.rotations_deg,
                 Some("AngleOfIncidence") => &mut header.incidences_deg,
                 Some("ScatterAzimuth") => &mut header.azimuths_deg,
                 Some("ScatterRadial") => &mut header.radials_deg,
@@ -276,7 +266,8 @@ mod tests {
 
     #[test]
     fn the_plane_of_incidence_is_taken_out_of_a_bsdf() {
-        let found = read_bsdf(BSDF.as_bytes()).unwrap();
+        let (found, notices) = read_bsdf(BSDF.as_bytes()).unwrap();
+        assert!(notices.is_empty(), "{notices:?}");
         let rows: Vec<[i64; 3]> = found
             .iter()
             .map(|p| [p.theta_i_rad.to_degrees(), p.theta_s_rad.to_degrees(), p.f_per_sr])
@@ -294,17 +285,21 @@ mod tests {
         assert!(message(&BSDF.replace("4 5 6", "4 5")).contains("line 14: 2 values for 3 angles"));
         assert!(message(&BSDF.replace("0 20 80", "0 x 80")).contains("line 8"));
         assert!(message(&BSDF.replace("Radial 3", "Radial 4")).contains("3 angles"));
-        let table = |text: &str| {
-            read_table(text.as_bytes(), &ColumnNames::default()).unwrap_err().to_string()
-        };
-        let header = "theta_i_deg,theta_s_deg,brdf_per_sr\n";
-        assert!(table(&format!("{header}10,95,0.1\n")).contains("column theta_s_deg"));
-        assert!(table(&format!("{header}10,20,0\n")).contains("column brdf_per_sr"));
-        let ours = ColumnNames::default();
-        assert!(is_table(header.as_bytes(), &ours) && !is_table(b"theta_deg,sigma0_db\n", &ours));
-        let blank = b"theta_i_deg;theta_s_deg;brdf_per_sr;blank_per_sr;note\n10;-10;0,2;0,1;a\n10;20;0,1;0,1;b\n";
-        let (found, notices) = read_table(blank, &ours).unwrap();
-        assert_eq!((found.len(), found[0].f_per_sr), (1, 0.2));
-        assert!(notices[0].contains("passed over: note") && notices[1].starts_with("1 of 2"));
+        for (word, said) in [("BTDF", "table of transmission"), ("XYZ", "three colours")] {
+            assert!(message(&BSDF.replace("Monochrome", word)).contains(said));
+        }
+        let more = format!("{BSDF}TIS 0.1\n1 2 0\n");
+        assert!(message(&more).contains("line 21: something stands behind the last block"));
+    }
+
+    #[test]
+    fn what_is_left_out_of_a_bsdf_is_said() {
+        let negative = BSDF.replace("1 2 0\n", "1 2 -3\n") + "DataEnd\n";
+        let (found, notices) = read_bsdf(negative.as_bytes()).unwrap();
+        assert_eq!(found.len(), 7);
+        assert_eq!(notices, ["1 value below zero, which no surface has, are left out"]);
+        let rotated = BSDF.replace("Source", "SampleRotation 2\n0 90\nSource") + "TIS 0.1\n";
+        let (_, notices) = read_bsdf(rotated.as_bytes()).unwrap();
+        assert_eq!(notices, ["of 2 rotations of the sample that at 0° is read"]);
     }
 }

@@ -6,7 +6,7 @@
 //! A level that is not above its blank (`blank_db`, or `blank_per_sr`) counts as a limit at the blank. A `.bsdf` is read as
 //! a table in the plane of incidence.
 
-use super::in_plane::{self, InPlane};
+use super::in_plane::{self, InPlane, VALUES_PER_SR};
 use crate::formats::csv::{Names, Table};
 use crate::formats::{ColumnNames, FormatError};
 use crate::material::curve::{Censor, Illumination, Observation};
@@ -19,33 +19,40 @@ const ANGLES: [&str; 3] = ["theta_deg", "grazing_deg", "theta_signed_deg"];
 const LEVELS: [&str; 2] = ["sigma0_db", "sigma0"];
 /// Columns of a table in the plane of incidence, all needed.
 const IN_PLANE: [&str; 3] = ["theta_i_deg", "theta_s_deg", "brdf_per_sr"];
-const OPTIONAL: [&str; 20] = [
+/// Columns that only a table of backscatter or of rows with `theta_r_deg` and `delta_phi_deg` may have.
+const NOT_IN_PLANE: [&str; 7] = [
     "censor",
     "threshold_db",
     "theta_r_deg",
     "delta_phi_deg",
+    "censored",
+    "only_detected",
+    "blank_db",
+];
+/// Columns that only a table in the plane of incidence may have.
+const ONLY_IN_PLANE: [&str; 2] = ["theta_i_deg", "blank_per_sr"];
+/// Columns of any table.
+const OPTIONAL: [&str; 12] = [
     "theta_sd_deg",
     "power_dbm",
     "range_m",
     "chirp",
-    "censored",
     "xt_m",
     "yt_m",
     "footprint",
     "beam_rad",
     "relative",
-    "only_detected",
     "curve",
     "kind",
-    "blank_db",
-    "blank_per_sr",
     "sd_db",
 ];
 
 /// Angles that a surface can be seen under, degrees.
 const QUARTER_TURN_DEG: (f64, f64) = (0.0, 90.0);
-/// Values of f that are no slip, 1/sr.
-const BRDFS_PER_SR: (f64, f64) = (1e-30, 1e30);
+/// Azimuths between source and receiver, degrees.
+const TURN_DEG: (f64, f64) = (-360.0, 360.0);
+/// Deviations of levels that are no slip, dB.
+const DEVIATIONS_DB: (f64, f64) = (1e-6, 100.0);
 /// Levels that are no slip, dB.
 const LEVELS_DB: (f64, f64) = (-300.0, 300.0);
 /// Powers that are no slip, dBm.
@@ -63,6 +70,10 @@ const BEAMS_RAD: (f64, f64) = (1e-6, std::f64::consts::FRAC_PI_2);
 pub struct Points {
     /// Each point behind the number of its line, or of its value in a `.bsdf`.
     pub rows: Vec<(usize, Observation)>,
+    /// Standard deviation of the level of each point, dB, where the file states it.
+    pub sd_db: Vec<Option<f64>>,
+    /// Whether the file is a table in the plane of incidence, by its columns or as a `.bsdf`.
+    pub is_in_plane: bool,
     /// How the target was lit and seen, as far as columns state it.
     pub illumination: Illumination,
     /// A sentence on columns of which nothing is read.
@@ -81,10 +92,13 @@ pub struct Points {
 /// The first cell that cannot be used, with its line and column; a table in which every level is below its blank.
 pub fn points(bytes: &[u8], names: &ColumnNames) -> Result<Points, FormatError> {
     if in_plane::is_bsdf(bytes) {
-        let values = in_plane::read_bsdf(bytes)?;
+        let (values, notices) = in_plane::read_bsdf(bytes)?;
         let rows = values.iter().map(InPlane::observation).enumerate();
         return Ok(Points {
             rows: rows.map(|(n, row)| (n + 1, row)).collect(),
+            sd_db: vec![None; values.len()],
+            is_in_plane: true,
+            notices,
             ..Points::default()
         });
     }
@@ -92,7 +106,9 @@ pub fn points(bytes: &[u8], names: &ColumnNames) -> Result<Points, FormatError> 
     table.rename(names)?;
     table.lower_case();
     let form = Form::of(&table)?;
-    let known: Vec<&str> = [&ANGLES[..], &LEVELS, &IN_PLANE, &OPTIONAL].concat();
+    form.refuse_the_other(&table)?;
+    let known: Vec<&str> =
+        [&ANGLES[..], &LEVELS, &IN_PLANE, &NOT_IN_PLANE, &ONLY_IN_PLANE, &OPTIONAL].concat();
     let passed_over = table.passed_over(&known);
     let mut notices = Vec::new();
     one_of(&table, "curve", "another curve begins here")?;
@@ -100,13 +116,14 @@ pub fn points(bytes: &[u8], names: &ColumnNames) -> Result<Points, FormatError> 
     one_of(&table, "beam_rad", "the rows above have another beam")?;
     one_of(&table, "relative", "the rows above say otherwise")?;
     one_of(&table, "only_detected", "the rows above say otherwise")?;
-    let mut rows = Vec::with_capacity(table.len());
+    let (mut rows, mut sd_db) = (Vec::with_capacity(table.len()), Vec::new());
     let mut below = 0;
     for row in 0..table.len() {
         let point = form.point(&table, row)?;
         let (point, is_below) = above_blank(point, form.blank(&table, row, &point)?);
         below += usize::from(is_below);
         rows.push((table.line(row), point));
+        sd_db.push(table.number_within(row, "sd_db", DEVIATIONS_DB)?);
     }
     if below > 0 {
         let all = rows.len();
@@ -117,7 +134,9 @@ pub fn points(bytes: &[u8], names: &ColumnNames) -> Result<Points, FormatError> 
         notices
             .push(format!("{below} of {all} levels are not above their blank and count as limits"));
     }
-    Ok(Points { rows, illumination: illumination(&table)?, passed_over, notices })
+    let is_in_plane = matches!(form, Form::InPlane);
+    let illumination = illumination(&table)?;
+    Ok(Points { rows, sd_db, is_in_plane, illumination, passed_over, notices })
 }
 
 /// What the rows of a table hold.
@@ -140,11 +159,44 @@ impl Form {
         Ok(Form::Backscatter { angle, level })
     }
 
-    fn point(self, table: &Table, row: usize) -> Result<Observation, FormatError> {
-        match self {
-            Form::Backscatter { angle, level } => point(table, row, angle, level),
-            Form::InPlane => Ok(in_plane::read_row(table, row)?.observation()),
+    /// Refuses columns that a table of the other form has.
+    fn refuse_the_other(self, table: &Table) -> Result<(), FormatError> {
+        let (others, own, way_out) = match self {
+            Form::Backscatter { .. } => {
+                (&ONLY_IN_PLANE[..], "backscatter", "its blank in blank_db")
+            }
+            Form::InPlane => (
+                &[&ANGLES[..], &LEVELS, &NOT_IN_PLANE].concat()[..],
+                "the plane of incidence",
+                "a limit in blank_per_sr",
+            ),
+        };
+        match others.iter().find(|column| table.has(column)) {
+            None => Ok(()),
+            Some(column) => Err(FormatError::at(
+                "the header",
+                format!("a table of {own} has no `{column}`"),
+                format!("give {way_out}, or pass the column over by --columns {column}=-"),
+            )),
         }
+    }
+
+    fn point(self, table: &Table, row: usize) -> Result<Observation, FormatError> {
+        let point = match self {
+            Form::Backscatter { angle, level } => point(table, row, angle, level)?,
+            Form::InPlane => in_plane::read_row(table, row)?.observation(),
+        };
+        let number = |column: &'static str, range| table.number_within(row, column, range);
+        let chirp =
+            table.cell(row, "chirp").map(|_| table.whole_number(row, "chirp")).transpose()?;
+        Ok(Observation {
+            theta_sd_rad: number("theta_sd_deg", QUARTER_TURN_DEG)?.map(f64::to_radians),
+            power_w: number("power_dbm", POWERS_DBM)?.map(watts_from_dbm),
+            range_m: number("range_m", RANGES_M)?,
+            chirp,
+            target_m: place(table, row)?,
+            ..point
+        })
     }
 
     /// The blank of a row as σ⁰.
@@ -159,7 +211,7 @@ impl Form {
                 Ok(table.number_within(row, "blank_db", LEVELS_DB)?.map(ratio_from_db))
             }
             Form::InPlane => {
-                let blank = table.number_within(row, "blank_per_sr", BRDFS_PER_SR)?;
+                let blank = table.number_within(row, "blank_per_sr", VALUES_PER_SR)?;
                 Ok(blank.map(|f_per_sr| f_per_sr * point.aspect().sigma0_per_f()))
             }
         }
@@ -276,19 +328,15 @@ fn point(
         (_, level, limit) => (level, limit),
     };
     stated(table, row, censor, [level_db, limit_db], level)?;
-    let chirp = table.cell(row, "chirp").map(|_| table.whole_number(row, "chirp")).transpose()?;
+    // A whole turn is none.
+    let delta_phi_deg = number("delta_phi_deg", TURN_DEG)?.unwrap_or(0.0) % 360.0;
     Ok(Observation {
-        theta_i_rad: theta_i_deg.to_radians(),
         theta_r_rad: number("theta_r_deg", QUARTER_TURN_DEG)?.unwrap_or(theta_i_deg).to_radians(),
-        delta_phi_rad: table.number(row, "delta_phi_deg")?.unwrap_or(0.0).to_radians(),
+        delta_phi_rad: delta_phi_deg.to_radians() + 0.0,
         sigma0: level_db.map(ratio_from_db),
         censor,
         threshold_sigma0: limit_db.map(ratio_from_db),
-        theta_sd_rad: number("theta_sd_deg", QUARTER_TURN_DEG)?.map(f64::to_radians),
-        power_w: number("power_dbm", POWERS_DBM)?.map(watts_from_dbm),
-        range_m: number("range_m", RANGES_M)?,
-        chirp,
-        target_m: place(table, row)?,
+        ..Observation::backscatter(theta_i_deg.to_radians(), None, None)
     })
 }
 
@@ -478,6 +526,28 @@ mod tests {
     }
 
     #[test]
+    fn what_belongs_to_any_point_is_read_in_the_plane_of_incidence_too() {
+        let columns = "theta_sd_deg,power_dbm,range_m,chirp,xt_m,yt_m,sd_db";
+        let cells = "0.5,-30,2.5,7,0.1,-0.2,0.4";
+        let plane = format!("theta_i_deg,theta_s_deg,brdf_per_sr,{columns}\n30,-30,0.1,{cells}\n");
+        let retro = format!("theta_deg,sigma0_db,{columns}\n30,-3,{cells}\n");
+        let [plane, retro] = [plane, retro].map(|text| points(text.as_bytes(), &ours()).unwrap());
+        assert_eq!((plane.is_in_plane, retro.is_in_plane), (true, false));
+        assert_eq!((&plane.sd_db, plane.passed_over), (&retro.sd_db, None));
+        let of = |points: &[(usize, Observation)]| Observation { sigma0: None, ..points[0].1 };
+        assert_eq!(of(&plane.rows), of(&retro.rows));
+        assert_eq!(plane.rows[0].1.range_m, Some(2.5));
+    }
+
+    #[test]
+    fn a_whole_turn_between_source_and_receiver_is_backscatter() {
+        for turn_deg in [-360, 0, 360] {
+            let text = format!("theta_deg,sigma0_db,delta_phi_deg\n30,-10,{turn_deg}\n");
+            assert!(points(text.as_bytes(), &ours()).unwrap().rows[0].1.is_retro(), "{turn_deg}");
+        }
+    }
+
+    #[test]
     fn a_table_in_the_plane_of_incidence_is_a_bistatic_curve() {
         let text = "theta_i_deg,theta_s_deg,brdf_per_sr\n30,-30,0.1\n30,60,0.2\n";
         let rows = points(text.as_bytes(), &ours()).unwrap().rows;
@@ -514,6 +584,15 @@ mod tests {
             ("theta_deg,level\n10,-3\n", "there is no column `sigma0_db`"),
             ("theta_deg,sigma0\n10,-0.5\n", "line 2, column sigma0: `-0.5` is not accepted here"),
             ("theta_deg,theta_s_deg,brdf_per_sr\n1,2,3\n", "there is no column `theta_i_deg`"),
+            (
+                "theta_i_deg,theta_s_deg,brdf_per_sr,censor,threshold_db\n1,2,3,none,\n",
+                "a table of the plane of incidence has no `censor`; give a limit in blank_per_sr",
+            ),
+            (
+                "theta_deg,sigma0_db,blank_per_sr\n1,2,3\n",
+                "a table of backscatter has no `blank_per_sr`; give its blank in blank_db",
+            ),
+            ("theta_deg,sigma0_db,delta_phi_deg\n1,2,1e300\n", "give a value from -360 to 360"),
             ("theta_deg,sigma0_db,only_detected\n1,2,yes\n", "column only_detected: `yes`"),
         ] {
             let error = points(text.as_bytes(), &ours()).unwrap_err().to_string();

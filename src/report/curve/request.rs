@@ -5,9 +5,11 @@ use std::path::Path;
 use crate::brdf::Brdf;
 use crate::diagnose::curve::{CurveDiagnosis, CurveReport, Points, Term, base_law};
 use crate::error::Error;
+use crate::formats::words::counted;
 use crate::formats::{ColumnNames, FormatError};
 use crate::material::Observation;
-use crate::material::file::in_plane::{self, InPlane};
+use crate::material::file::in_plane::InPlane;
+use crate::material::file::points;
 use crate::measure::Curve;
 
 /// What to diagnose.
@@ -46,35 +48,35 @@ impl CurveRequest<'_> {
     }
 
     fn points(&self, bytes: &[u8]) -> Result<(Points, Vec<String>), Error> {
-        let is_named_so = self.path.extension().is_some_and(|end| end.eq_ignore_ascii_case("bsdf"));
-        let is_bsdf = is_named_so || in_plane::is_bsdf(bytes);
-        let noise_db = self.noise_db;
-        let points = if is_bsdf {
-            in_plane::read_bsdf(bytes).map(|table| (Points::in_plane(&table, noise_db), Vec::new()))
-        } else if in_plane::is_table(bytes, self.columns) {
-            in_plane::read_table(bytes, self.columns)
-                .map(|(table, notices)| (Points::in_plane(&table, noise_db), notices))
-        } else {
-            Curve::read_as(bytes, self.columns).and_then(|(curve, notices)| {
-                if curve.observations.iter().all(Observation::is_retro) {
-                    return Ok((Points::backscatter(&curve, noise_db), notices));
-                }
-                Ok((Points::in_plane(&values(&curve)?, noise_db), notices))
-            })
-        };
-        points.map_err(|error| Error::CurveFile { file: self.path.to_owned(), error })
+        self.read(bytes).map_err(|error| Error::CurveFile { file: self.path.to_owned(), error })
+    }
+
+    fn read(&self, bytes: &[u8]) -> Result<(Points, Vec<String>), FormatError> {
+        let table = points(bytes, self.columns)?;
+        let (sd_db, is_in_plane) = (table.sd_db.clone(), table.is_in_plane);
+        let (curve, mut notices) = Curve::of_points(table)?;
+        if !is_in_plane && curve.observations.iter().all(Observation::is_retro) {
+            return Ok((Points::backscatter(&curve, &sd_db, self.noise_db), notices));
+        }
+        let censored = curve.observations.iter().filter(|row| row.is_censored()).count();
+        if censored > 0 {
+            let all = counted(curve.observations.len(), "level");
+            notices.push(format!("{censored} of {all} are limits, and are left out"));
+        }
+        Ok((Points::in_plane(&values(&curve, &sd_db)?, self.noise_db), notices))
     }
 }
 
 /// The detections of a curve as values in the plane of incidence.
-fn values(curve: &Curve) -> Result<Vec<InPlane>, FormatError> {
+fn values(curve: &Curve, sd_db: &[Option<f64>]) -> Result<Vec<InPlane>, FormatError> {
     let mut values = Vec::new();
-    for (place, row) in curve.observations.iter().enumerate().filter(|(_, row)| !row.is_censored())
-    {
-        values.push(InPlane::of(row).ok_or_else(|| {
+    let rows = curve.observations.iter().zip(sd_db).enumerate();
+    for (place, (row, sd_db)) in rows.filter(|(_, (row, _))| !row.is_censored()) {
+        let value = InPlane::of(row).ok_or_else(|| {
             let place = format!("point {} (from 1)", place + 1);
             FormatError::at(place, "it is out of the plane of incidence", "leave such points out")
-        })?);
+        })?;
+        values.push(InPlane { sd_db: *sd_db, ..value });
     }
     Ok(values)
 }
