@@ -13,7 +13,7 @@ use crate::support::database::{complete, sample};
 use crate::support::{matdb, refused, root};
 use matdb::brdf::{Brdf, CookTorrance, Distribution, Lambert, Mixture, Scattering, Shadowing};
 use matdb::catalogue::exchange::{Details, Foreign, Format, Subject, export};
-use matdb::material::{Censor, Material, SourceKind, builtin};
+use matdb::material::{Censor, Material, Observation, SourceKind, builtin};
 use proptest::prelude::*;
 use proptest::sample::Index;
 use serde_json::Value;
@@ -201,7 +201,16 @@ fn a_curve_survives_csv_and_universal_brdf() {
         for (a, b) in curve.iter().zip(back) {
             assert!((a.theta_i_rad - b.theta_i_rad).abs() < 1e-12 && b.is_retro());
             assert_eq!(a.censor, b.censor);
-            for (x, y) in [(a.sigma0, b.sigma0), (a.threshold_sigma0, b.threshold_sigma0)] {
+            let all = format == Format::Csv;
+            let details = |o: &Observation| {
+                let [xt_m, yt_m] = [0, 1].map(|axis| o.target_m.map(|place| place[axis]));
+                [o.theta_sd_rad, o.power_w, o.range_m, o.chirp.map(f64::from), xt_m, yt_m]
+            };
+            let kept = details(a).into_iter().zip(details(b)).filter(|_| all);
+            for (x, y) in [(a.sigma0, b.sigma0), (a.threshold_sigma0, b.threshold_sigma0)]
+                .into_iter()
+                .chain(kept)
+            {
                 assert_eq!(x.is_some(), y.is_some());
                 assert!(x.zip(y).is_none_or(|(x, y)| (x / y - 1.0).abs() < 1e-12));
             }
@@ -575,7 +584,12 @@ fn a_bare_curve_is_named_by_its_file_and_says_what_it_is_found_and_cited_by() {
     ]);
     let [said, _] = run(&["export", "paint", "--as", "csv", "--curve", "second", "-o", "out.csv"]);
     assert!(said.contains("the curve `second` and not spring"), "{said}");
-    assert!(fs::read_to_string(folder.path().join("out.csv")).unwrap().contains("\n25,-24"));
+    let exported = fs::read_to_string(folder.path().join("out.csv")).unwrap();
+    assert!(exported.contains("\n25,-24"));
+    // What the file did not state is not made up.
+    assert!(
+        exported.contains("\ntheta_deg,sigma0_db,censor,threshold_db,theta_r_deg,delta_phi_deg\n")
+    );
     let wrong = ["export", "paint", "--as", "csv", "--curve", "third", "-o", "out.csv"];
     let said = refused(matdb(folder.path()).args(wrong));
     assert!(said.contains("no curve `third`; there are: spring, second"), "{said}");

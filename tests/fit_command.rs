@@ -324,6 +324,14 @@ fn points_that_are_there_already_are_not_stored_twice() {
     fs::write(folder.join("scan.csv"), "theta_deg,sigma0_db\n0,-3\n20,-4\n50,-6\n61,-8\n").unwrap();
     let refusal = refused(matdb(folder).args(fit).args(&said));
     assert!(refusal.contains("has another curve `scan`, from bench; give this curve"), "{refusal}");
+    let slow = |s| match s {
+        "Radar" => "Slow",
+        "300" => "77",
+        other => other,
+    };
+    let slow: Vec<&str> = said.iter().copied().map(slow).collect();
+    let refusal = refused(matdb(folder).args(fit).args(&slow).args(["--curve", "third"]));
+    assert!(refusal.contains("was measured at 77 GHz and the entry claims 300 GHz"), "{refusal}");
 }
 
 #[test]

@@ -42,8 +42,8 @@ pub(super) struct Args {
     #[arg(long)]
     shape: bool,
     /// How many to show at most
-    #[arg(long, default_value_t = 10, value_name = "N", allow_negative_numbers = true)]
-    limit: usize,
+    #[arg(long, default_value_t = 10, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
+    limit: u32,
     #[command(flatten)]
     filter: FilterArgs,
 }
@@ -59,7 +59,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
             "rank by shape (--shape)",
         ));
     }
-    let report = search.run(store.as_ref(), &args.filter.filter(), rank, args.limit)?;
+    let report = search.run(store.as_ref(), &args.filter.filter(), rank, args.limit as usize)?;
     report.notices.iter().for_each(|notice| console.notice(notice));
     console.result(&text(&report, args), &report)
 }
@@ -79,6 +79,10 @@ fn search(args: &Args, store: Option<&Store>) -> Result<(NeighbourSearch, Vec<St
 
 fn text(record: &NeighbourReport, args: &Args) -> String {
     let mut text = match record.materials.as_slice() {
+        [] if record.left_out == 0 => {
+            return "no material is left by --frequency, --class and the other conditions\n"
+                .to_owned();
+        }
         [] => "no material has enough angles in common with the curve\n".to_owned(),
         found => table(
             &[

@@ -92,6 +92,16 @@ pub enum FitError {
     /// A start or fixed value is out of range.
     #[error(transparent)]
     Parameter(#[from] ParameterError),
+    /// Relative levels that are above those of any law.
+    #[error(
+        "the levels are relative and above those that any law has: {name} stopped at its bound {}, and the other numbers          follow it; lower all levels by the same 20 dB or more, which changes nothing else", shown(*bound)
+    )]
+    RelativeLevels {
+        /// The level that stopped.
+        name: String,
+        /// Its bound.
+        bound: f64,
+    },
     /// The model has no free parameter.
     #[error("nothing is left to fit; free a parameter or choose a model that has some")]
     NothingFree,

@@ -70,6 +70,9 @@ pub(super) fn judge(result: &FitResult, found: &SearchResult, curve: &Curve) -> 
     {
         findings.push(Finding::MoreThanSpeckle { looks });
     }
+    if scatters_less_than_any_speckle(result) {
+        return findings;
+    }
     findings.extend(judge_neighbours(result, rows));
     let limit = KOLMOGOROV_1_PERCENT / f64::from(result.goodness.rows.max(1)).sqrt();
     let ks_distance = result.goodness.ks_distance;
@@ -85,6 +88,16 @@ fn is_level_at_bound(finding: &Finding) -> bool {
         Finding::AtBound { name, .. } => [SPECULAR_LEVEL, DIFFUSE_LEVEL].contains(&name.as_str()),
         _ => false,
     }
+}
+
+/// Whether the levels scatter less about the model than the most looks leave: of levels without noise no law of speckle
+/// says whether a model explains them, and what is left of them is rounding.
+fn scatters_less_than_any_speckle(result: &FitResult) -> bool {
+    let looks = result.estimates.iter().zip(&result.coordinates.list);
+    let mut looks = looks.filter(|(estimate, _)| estimate.name == LOOKS);
+    looks.any(|(estimate, coordinate)| {
+        estimate.value == coordinate.max && result.goodness.z_variance < 1.0
+    })
 }
 
 /// That residuals of neighbouring angles are alike.

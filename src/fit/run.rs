@@ -1,6 +1,6 @@
 //! Runs a fit: checks its settings and its rows, then searches.
 
-use super::coordinates::{Coordinates, LOOKS};
+use super::coordinates::{Coordinates, DIFFUSE_LEVEL, LOOKS, SPECULAR_LEVEL};
 use super::error::FitError;
 use super::parts::Parts;
 use super::result::FitResult;
@@ -48,8 +48,23 @@ impl Fit {
             return Err(FitError::TooFewRows { detected, unknowns });
         }
         let found = self.search(&coordinates, &curve.observations);
-        Ok(summarise(self, coordinates, &found, curve))
+        let result = summarise(self, coordinates, &found, curve);
+        match stopped_level(&result).filter(|_| curve.illumination.relative) {
+            Some((name, bound)) => Err(FitError::RelativeLevels { name, bound }),
+            None => Ok(result),
+        }
     }
+}
+
+/// A level of the model that stopped at the upper end of its range, and that.
+fn stopped_level(result: &FitResult) -> Option<(String, f64)> {
+    const LEVELS: [&str; 5] = [SPECULAR_LEVEL, DIFFUSE_LEVEL, "albedo", "r_s", "f_lambda"];
+    let pairs = result.estimates.iter().zip(&result.coordinates.list);
+    let mut stopped = pairs.filter(|(estimate, coordinate)| {
+        let name = estimate.name.rsplit('.').next().unwrap_or_default();
+        LEVELS.contains(&name) && estimate.sd.is_none() && estimate.value == coordinate.max
+    });
+    stopped.next().map(|(estimate, coordinate)| (estimate.name.clone(), coordinate.max))
 }
 
 fn check_rows(rows: &[Observation]) -> Result<(), FitError> {
@@ -256,6 +271,41 @@ mod tests {
             // A band is 1.96 deviations wide; truth within twice that.
             assert!(ratio.ln().abs() < 2.0 * (high / mid).ln(), "{theta_deg}: {ratio} {found:?}");
         }
+    }
+
+    #[test]
+    fn relative_levels_above_any_law_are_refused_and_others_are_not() {
+        let raised = |by: f64| {
+            let mut curve = Twin { rows: 400, ..Twin::default() }.curve(1);
+            curve.illumination.relative = true;
+            for row in &mut curve.observations {
+                row.sigma0 = row.sigma0.map(|sigma0| by * sigma0);
+                row.threshold_sigma0 = row.threshold_sigma0.map(|limit| by * limit);
+            }
+            quick().run(&start(), &curve)
+        };
+        let error = raised(1e6).unwrap_err();
+        assert!(error.to_string().contains("lower all levels"), "{error}");
+        let [own, lowered] = [1.0, 0.1].map(|by| raised(by).unwrap());
+        let alpha = |result| value(result, "diffuse.alpha");
+        assert!((alpha(&own) - alpha(&lowered)).abs() < 1e-3, "{}", alpha(&lowered));
+    }
+
+    #[test]
+    fn levels_without_noise_are_not_called_unexplained() {
+        let curve = Curve::read(
+            (0..60)
+                .map(|deg| (deg, start().sigma0(f64::from(deg).to_radians())))
+                .fold("theta_deg,sigma0_db\n".to_owned(), |text, (deg, sigma0)| {
+                    text + &format!("{deg},{:.6}\n", db_from_ratio(sigma0))
+                })
+                .as_bytes(),
+        );
+        let found = quick().run(&start(), &curve.unwrap()).unwrap();
+        let is_doubted =
+            |f: &Finding| matches!(f, Finding::PoorFit { .. } | Finding::NeighboursAlike { .. });
+        assert!(!found.verdict.iter().any(is_doubted), "{:?}", found.verdict);
+        assert!((value(&found, "diffuse.alpha") - 3.0).abs() < 1e-2, "{found:?}");
     }
 
     #[test]

@@ -135,12 +135,12 @@ pub enum Finding {
 impl Finding {
     /// Whether the data leave the curve of the model undetermined at some angle, and not only its numbers.
     pub fn leaves_the_curve_open(&self) -> bool {
-        matches!(
-            self,
-            Finding::NoDiffuseRows { .. }
-                | Finding::Unconstrained { .. }
-                | Finding::OpenInterval { .. }
-        )
+        match self {
+            Finding::NoDiffuseRows { .. } | Finding::Unconstrained { .. } => true,
+            // A diffuse lobe without an exponent is Lambert's: a law like any other.
+            Finding::OpenInterval { name, value } => *value != 0.0 || !name.ends_with("alpha"),
+            _ => false,
+        }
     }
 }
 
@@ -255,6 +255,15 @@ impl fmt::Display for Finding {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_diffuse_lobe_that_may_be_lamberts_leaves_no_curve_open() {
+        let open = |name: &str, value| {
+            Finding::OpenInterval { name: name.to_owned(), value }.leaves_the_curve_open()
+        };
+        assert!(!open("diffuse.alpha", 0.0));
+        assert!(open("diffuse.alpha", 1000.0) && open("R", 0.0));
+    }
 
     #[test]
     fn findings_are_sentences_about_named_things() {

@@ -5,13 +5,16 @@ use super::entry::kind_of;
 use super::picture::Picture;
 use crate::brdf::{Scattering, ThroughBeam};
 use crate::formats::figure::{Series, Style};
-use crate::material::{Fit, Material};
+use crate::material::{Fit, Material, Observation};
 use crate::units::db_from_ratio;
 
-/// Points of the fitted curve less the fit, dB; none when no curve was fitted.
+/// Backscatter of the fitted curve less the fit, dB; none where there is no backscatter or no curve was fitted.
 pub(super) fn picture(material: &Material, number: usize, fit: &Fit) -> Option<String> {
     let name = fit.curve.as_ref()?;
     let curve = material.curves.iter().find(|curve| curve.name == *name)?;
+    if !curve.observations.iter().any(Observation::is_retro) {
+        return None;
+    }
     let class = format!("ink0 {}", class_of(kind_of(material, &curve.source)));
     let series = |style, points| Series { name: String::new(), style, points };
     let seen = ThroughBeam { law: &fit.model, beam_rad: material.beam_rad(fit) };

@@ -223,7 +223,11 @@ fn numbers(table: ply::Table) -> Numbers {
 
 /// Text whose header may be missing.
 fn text(bytes: &[u8]) -> Result<csv::Table, FormatError> {
-    let mut table = csv::Table::parse(bytes, Names::WhereTheyAre)?;
+    let mut table = if begins_with_a_count(bytes) {
+        csv::Table::parse(&[b"#", bytes].concat(), Names::WhereTheyAre)?
+    } else {
+        csv::Table::parse(bytes, Names::WhereTheyAre)?
+    };
     let names = match table.columns().collect::<Vec<_>>()[..] {
         ["1", "2", "3"] => "1=x,2=y,3=z",
         ["1", "2", "3", "4"] => "1=x,2=y,3=z,4=power",
@@ -231,6 +235,14 @@ fn text(bytes: &[u8]) -> Result<csv::Table, FormatError> {
     };
     table.rename(&names.parse()?)?;
     Ok(table)
+}
+
+/// Whether the first line is the number of points, as scanners write it in a `.pts`, and the second has more than that.
+fn begins_with_a_count(bytes: &[u8]) -> bool {
+    let mut lines = bytes.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii);
+    let is_count =
+        |line: &[u8]| !line.is_empty() && line.len() < 20 && line.iter().all(u8::is_ascii_digit);
+    lines.next().is_some_and(is_count) && lines.next().is_some_and(|line| !is_count(line))
 }
 
 #[cfg(test)]
@@ -272,6 +284,13 @@ mod tests {
         five.rename(&"5=power_dbm".parse().unwrap()).unwrap();
         assert_eq!(five.names(), ["1", "2", "3", "4", "power_dbm"]);
         assert_eq!((five.len(), five.place(0)), (1, "line 1".to_owned()));
+    }
+
+    #[test]
+    fn the_number_of_points_may_come_first() {
+        let counted = read(PointFormat::Xyz, b"2\r\n0 1 2 -60\r\n3 4 5 -61\r\n");
+        assert_eq!(counted.column("power"), Ok(Some(vec![-60.0, -61.0])));
+        assert_eq!(counted.place(1), "line 3");
     }
 
     #[test]

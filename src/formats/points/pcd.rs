@@ -124,12 +124,25 @@ impl Header {
                 return Err(FormatError::at(format!("line {line}"), problem, way_out));
             }
         };
-        let points = match entries.find("POINTS") {
-            Some(points) => whole_number(points)?,
-            None => {
-                let [width, height] = ["WIDTH", "HEIGHT"].map(|name| entries.get(name));
-                whole_number(width?)?.saturating_mul(whole_number(height?)?)
+        let by_size = match ["WIDTH", "HEIGHT"].map(|name| entries.find(name)) {
+            [Some(width), Some(height)] => {
+                Some(whole_number(width)?.saturating_mul(whole_number(height)?))
             }
+            _ => None,
+        };
+        let points = match (entries.find("POINTS"), by_size) {
+            (Some(stated), by_size) => {
+                let points = whole_number(stated)?;
+                if by_size.is_some_and(|by_size| by_size != points) {
+                    let problem = format!(
+                        "there are {points} POINTS and WIDTH times HEIGHT is another number"
+                    );
+                    return Err(FormatError::at("header", problem, "correct one of the three"));
+                }
+                points
+            }
+            (None, Some(by_size)) => by_size,
+            (None, None) => whole_number(entries.get("POINTS")?)?,
         };
         Ok(Header { fields, points, data, lines, start })
     }
@@ -358,12 +371,15 @@ mod tests {
             ("TYPE F", "TYPE X", "a field of type X and 4 bytes"),
             ("SIZE 4", "SIZE four", "are not whole numbers"),
             ("POINTS 2", "POINTS 2 2", "give one number"),
+            ("POINTS 2", "POINTS 3", "WIDTH times HEIGHT is another number"),
             ("POINTS 2", "POINTS 99999999999999999999", "are not whole numbers"),
         ] {
             let error = read_all(ours.replace(old, new).as_bytes()).unwrap_err();
             assert!(error.contains(said), "{error}");
         }
-        let vast = ours.replace("POINTS 2", "POINTS 18446744073709551615");
+        let vast = ours
+            .replace("WIDTH 2\nHEIGHT 1\n", "")
+            .replace("POINTS 2", "POINTS 18446744073709551615");
         assert!(read_all(vast.replace("ascii", "binary").as_bytes()).is_err());
     }
 }

@@ -6,9 +6,12 @@
 //! A level that is not above its blank (`blank_db`, or `blank_per_sr`) counts as a limit at the blank. A `.bsdf` is read as
 //! a table in the plane of incidence.
 
+use std::collections::HashSet;
+
 use super::in_plane::{self, InPlane, VALUES_PER_SR};
 use crate::formats::csv::{Names, Table};
 use crate::formats::{ColumnNames, FormatError};
+use crate::material::Aspect;
 use crate::material::curve::{Censor, Illumination, Observation};
 use crate::radar::Footprint;
 use crate::units::{db_from_ratio, ratio_from_db, watts_from_dbm};
@@ -134,9 +137,31 @@ pub fn points(bytes: &[u8], names: &ColumnNames) -> Result<Points, FormatError> 
         notices
             .push(format!("{below} of {all} levels are not above their blank and count as limits"));
     }
+    notices.extend(copies(&rows));
     let is_in_plane = matches!(form, Form::InPlane);
     let illumination = illumination(&table)?;
     Ok(Points { rows, sd_db, is_in_plane, illumination, passed_over, notices })
+}
+
+/// That many rows say exactly what another one says.
+fn copies(rows: &[(usize, Observation)]) -> Option<String> {
+    /// Levels of few digits coincide at repeated angles.
+    const BY_CHANCE: usize = 10;
+    let key = |point: &Observation| {
+        let Observation { sigma0, threshold_sigma0, range_m, chirp, target_m, .. } = *point;
+        let Aspect { theta_i_rad, theta_r_rad, delta_phi_rad } = point.aspect();
+        let angles = [theta_i_rad, theta_r_rad, delta_phi_rad].map(f64::to_bits);
+        let levels = [sigma0, threshold_sigma0, range_m].map(|x| x.map(f64::to_bits));
+        (angles, levels, chirp, target_m.map(|place| place.map(f64::to_bits)))
+    };
+    let different: HashSet<_> = rows.iter().map(|(_, point)| key(point)).collect();
+    let copies = rows.len() - different.len();
+    (copies * BY_CHANCE > rows.len()).then(|| {
+        format!(
+            "{copies} of {} rows are equal to another row; each counts as a measurement of its own, so leave copies out",
+            rows.len()
+        )
+    })
 }
 
 /// What the rows of a table hold.
@@ -453,6 +478,13 @@ mod tests {
             let error = read(row).unwrap_err();
             assert!(error.starts_with(said), "{error}");
         }
+    }
+
+    #[test]
+    fn copied_rows_are_said() {
+        let copied = "theta_deg,sigma0_db\n10,-3\n20,-4\n30,-5\n10,-3\n20,-4\n30,-5.1\n";
+        let notices = points(copied.as_bytes(), &ours()).unwrap().notices;
+        assert!(notices[0].starts_with("2 of 6 rows are equal to another row"), "{notices:?}");
     }
 
     #[test]
