@@ -89,8 +89,9 @@ impl Default for CloudReading {
 /// Names of the columns of places.
 const PLACES: [&str; 9] = ["x_m", "y_m", "z_m", "x_mm", "y_mm", "z_mm", "x", "y", "z"];
 /// Names of the other columns that are read.
-const VALUES: [&str; 9] = [
+const VALUES: [&str; 10] = [
     "power_dbm",
+    "dbm",
     "power_w",
     "power_db",
     "power_counts",
@@ -186,6 +187,7 @@ impl CloudReading {
     ) -> Result<Option<(&'static str, PowerUnit)>, CloudError> {
         let named = [
             ("power_dbm", PowerUnit::Dbm),
+            ("dbm", PowerUnit::Dbm),
             ("power_w", PowerUnit::Watt),
             ("power_db", PowerUnit::RelativeDb),
             ("power_counts", PowerUnit::Counts),
