@@ -247,10 +247,15 @@ impl Form {
 fn the_one(table: &Table, names: &[&'static str]) -> Result<&'static str, FormatError> {
     let there: Vec<&'static str> = names.iter().copied().filter(|name| table.has(name)).collect();
     match there[..] {
-        [] => {
-            table.check(&names[..1])?;
-            Ok(names[0])
-        }
+        [] => Err(FormatError::at(
+            "the header",
+            format!("there is no column `{}`", names[0]),
+            format!(
+                "the columns are {}; give others their names by --columns THEIRS=OURS: a curve has theta_deg and \
+                 sigma0_db, or theta_i_deg, theta_s_deg and brdf_per_sr",
+                table.columns().collect::<Vec<_>>().join(", ")
+            ),
+        )),
         [only] => Ok(only),
         [first, second, ..] => Err(FormatError::at(
             "the header",
