@@ -78,8 +78,12 @@ impl Bistatic {
                 0 => coordinates.start(),
                 _ => drawn_start(&coordinates, self.seed, number),
             };
-            let end =
-                SEARCH.run(&start, [&bounds[0], &bounds[1]], |at| local(&coordinates, samples, at));
+            let end = SEARCH.run_with(
+                &start,
+                [&bounds[0], &bounds[1]],
+                |at| half_squares(&levels_db(&coordinates.model(at), samples), samples),
+                |at| local(&coordinates, samples, at),
+            );
             found.push(((2.0 * end.local.value / samples.len() as f64).sqrt(), end));
         }
         let Some((rms_db, best)) = found.iter().min_by(|(a, _), (b, _)| a.total_cmp(b)) else {
@@ -128,10 +132,17 @@ fn local(coordinates: &Coordinates, samples: &[Sample], at: &DVector<f64>) -> Lo
         let residual = level_db - db_from_ratio(sample.f_per_sr);
         let jacobian: Vec<f64> =
             moved.iter().map(|(step, there)| (there[row] - level_db) / step).collect();
-        sum.value += 0.5 * residual * residual;
         sum.add(residual, 1.0, &jacobian);
     }
+    sum.value = half_squares(&here, samples);
     sum
+}
+
+/// ½Σ of squared residuals of levels, dB².
+fn half_squares(levels_db: &[f64], samples: &[Sample]) -> f64 {
+    let residuals =
+        samples.iter().zip(levels_db).map(|(sample, db)| db - db_from_ratio(sample.f_per_sr));
+    residuals.map(|residual| 0.5 * residual * residual).sum()
 }
 
 /// Levels of a model in the directions of the samples, dB.

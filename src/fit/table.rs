@@ -8,6 +8,8 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::LazyLock;
 
+use rayon::prelude::*;
+
 use crate::brdf::{Retro, Scattering, ThroughBeam};
 use crate::frames::{Direction, Surface};
 use crate::material::Aspect;
@@ -18,6 +20,8 @@ const INTERVALS: usize = 1024;
 const BETA: f64 = 6.0;
 /// Last knot, rad; at π/2 itself ln σ⁰ is −∞.
 const THETA_END_RAD: f64 = 0.999 * FRAC_PI_2;
+/// Fewest pairs of directions that are worth another thread.
+const PAIRS_AT_ONCE: usize = 512;
 /// ln σ⁰ that stands for 0.
 const LN_NOTHING: f64 = -600.0;
 
@@ -108,9 +112,10 @@ impl Table {
             sigma0.push(4.0 * PI * f_per_sr * v.cos_theta().powi(2));
         }
         let seen = ThroughBeam { law, beam_rad };
-        for &[i, o] in &aspects.pairs {
-            sigma0.push(4.0 * PI * seen.f_per_sr(i, o) * i.cos_theta() * o.cos_theta());
-        }
+        let of_pair = |&[i, o]: &[Direction<Surface>; 2]| {
+            4.0 * PI * seen.f_per_sr(i, o) * i.cos_theta() * o.cos_theta()
+        };
+        sigma0.par_extend(aspects.pairs.par_iter().with_min_len(PAIRS_AT_ONCE).map(of_pair));
         let ln_sigma0 = sigma0.into_iter().map(f64::ln);
         let ln_sigma0 =
             ln_sigma0.map(|ln| if ln.is_nan() { LN_NOTHING } else { ln.max(LN_NOTHING) });

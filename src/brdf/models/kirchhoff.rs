@@ -272,13 +272,19 @@ impl Correlation {
 
     /// W_n over the one whose W_n/l² has this logarithm.
     fn spectrum_over(self, over_ln: f64, across: f64, beam: f64) -> impl Fn(f64) -> f64 {
-        let across2 = across * across;
+        let (across2, over) = (across * across, (-over_ln).exp());
         move |n| match self {
             Correlation::Gaussian => {
                 let width = n + beam;
                 PI / width * (-across2 / (4.0 * width) - over_ln).exp()
             }
-            Correlation::Exponential => (self.spectrum_ln(n, across, beam) - over_ln).exp(),
+            Correlation::Exponential => {
+                let square = n * n + across2;
+                if beam < UNSEEN * square {
+                    return TAU * n / (square * square.sqrt()) * over;
+                }
+                seen_exponential(n, across2, beam) * over
+            }
         }
     }
 

@@ -122,15 +122,23 @@ impl Model {
     /// 10·lg f at every point.
     pub fn levels_db(&self, at: &DVector<f64>, points: &[Point]) -> Vec<f64> {
         let (law, values) = self.numbers(at);
-        let mut levels = Vec::with_capacity(points.len());
-        for point in points {
-            let mut f_per_sr = law.f_per_sr(point.i, point.o);
-            for (term, values) in self.terms.iter().zip(&values) {
-                f_per_sr = term.scatter(values, &law, point, f_per_sr);
-            }
-            levels.push(db_from_ratio(f_per_sr.max(0.0)).max(NOTHING_DB));
-        }
-        levels
+        self.with_terms(&law, &of_law(&law, points), &values, points)
+    }
+
+    /// 10·lg f of a law with the terms of these parameters at every point; `f_per_sr` is that of the law alone.
+    fn with_terms(
+        &self,
+        law: &Brdf,
+        f_per_sr: &[f64],
+        values: &[Vec<f64>],
+        points: &[Point],
+    ) -> Vec<f64> {
+        let pairs = points.iter().zip(f_per_sr);
+        let with_terms = pairs.map(|(point, &of_law)| {
+            let terms = self.terms.iter().zip(values);
+            terms.fold(of_law, |f, (term, values)| term.scatter(values, law, point, f))
+        });
+        with_terms.map(|f_per_sr| db_from_ratio(f_per_sr.max(0.0)).max(NOTHING_DB)).collect()
     }
 
     /// A fit to the points for which `used` is true, from a start.
@@ -165,8 +173,12 @@ impl Model {
         points: &[Point],
         scale_db: f64,
     ) -> Minimum {
-        SEARCH
-            .run(start, [&bounds[0], &bounds[1]], |at| self.local(at, &bounds[1], points, scale_db))
+        SEARCH.run_with(
+            start,
+            [&bounds[0], &bounds[1]],
+            |at| cost(points, &self.levels_db(at, points), scale_db),
+            |at| self.local(at, &bounds[1], points, scale_db),
+        )
     }
 
     /// Rms residual of the detections, per degree of freedom, and at least the noise, dB.
@@ -186,8 +198,16 @@ impl Model {
         points: &[Point],
         scale_db: f64,
     ) -> Local {
-        let here = self.levels_db(at, points);
-        let moved = step_each(at, upper, STEP, |there| self.levels_db(there, points));
+        let (law, values) = self.numbers(at);
+        let f_per_sr = of_law(&law, points);
+        let here = self.with_terms(&law, &f_per_sr, &values, points);
+        let moved = step_each(at, upper, STEP, |there| {
+            let (moved, values) = self.numbers(there);
+            if moved == law {
+                return self.with_terms(&law, &f_per_sr, &values, points);
+            }
+            self.with_terms(&moved, &of_law(&moved, points), &values, points)
+        });
         let mut sum = Local::zero(at.len());
         for (row, (point, level_db)) in points.iter().zip(&here).enumerate() {
             let jacobian: Vec<f64> =
@@ -200,9 +220,9 @@ impl Model {
             } else {
                 (-z / scale_db, scale_db.powi(-2))
             };
-            sum.value -= log_p(point, *level_db, scale_db);
             sum.add(first, second, &jacobian);
         }
+        sum.value = cost(points, &here, scale_db);
         sum
     }
 
@@ -228,6 +248,17 @@ impl Model {
         }
         all
     }
+}
+
+/// f of a law at every point, 1/sr.
+fn of_law(law: &Brdf, points: &[Point]) -> Vec<f64> {
+    points.iter().map(|point| law.f_per_sr(point.i, point.o)).collect()
+}
+
+/// −ln p of points about a model's levels, dB.
+fn cost(points: &[Point], levels_db: &[f64], scale_db: f64) -> f64 {
+    let pairs = points.iter().zip(levels_db);
+    -pairs.map(|(point, level_db)| log_p(point, *level_db, scale_db)).sum::<f64>()
 }
 
 /// ln p of a point about a model's level, both dB.
