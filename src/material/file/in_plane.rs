@@ -289,7 +289,7 @@ mod tests {
             assert!(message(&BSDF.replace("Monochrome", word)).contains(said));
         }
         let more = format!("{BSDF}TIS 0.1\n1 2 0\n");
-        assert!(message(&more).contains("line 21: something stands behind the last block"));
+        assert!(message(&more).contains("line 20: something stands behind the last block"));
     }
 
     #[test]
