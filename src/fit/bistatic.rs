@@ -7,6 +7,7 @@
 use nalgebra::DVector;
 use serde::Serialize;
 
+use super::by_parts::ByParts;
 use super::coordinates::{Coordinates, frequencies};
 use super::error::FitError;
 use super::minimise::{Local, Minimise, Stop, step_each};
@@ -125,8 +126,13 @@ impl Bistatic {
 /// ½Σ of squared residuals in dB.
 fn local(coordinates: &Coordinates, samples: &[Sample], at: &DVector<f64>) -> Local {
     let upper = coordinates.upper();
-    let here = levels_db(&coordinates.model(at), samples);
-    let moved = step_each(at, &upper, STEP, |there| levels_db(&coordinates.model(there), samples));
+    let directions: Vec<_> = samples.iter().map(|sample| [sample.i, sample.o]).collect();
+    let by_parts = ByParts::new(&coordinates.model(at), &directions);
+    let here = levels_of_db(&by_parts.f_per_sr());
+    let moved = step_each(at, &upper, STEP, |there| {
+        let there = by_parts.moved_to(&coordinates.model(there), &directions);
+        levels_of_db(&there.f_per_sr())
+    });
     let mut sum = Local::zero(at.len());
     for (row, (sample, level_db)) in samples.iter().zip(&here).enumerate() {
         let residual = level_db - db_from_ratio(sample.f_per_sr);
@@ -147,10 +153,12 @@ fn half_squares(levels_db: &[f64], samples: &[Sample]) -> f64 {
 
 /// Levels of a model in the directions of the samples, dB.
 fn levels_db(model: &Brdf, samples: &[Sample]) -> Vec<f64> {
-    samples
-        .iter()
-        .map(|sample| db_from_ratio(model.f_per_sr(sample.i, sample.o)).max(NOTHING_DB))
-        .collect()
+    let of_samples = samples.iter().map(|sample| model.f_per_sr(sample.i, sample.o));
+    levels_of_db(&of_samples.collect::<Vec<f64>>())
+}
+
+fn levels_of_db(f_per_sr: &[f64]) -> Vec<f64> {
+    f_per_sr.iter().map(|f_per_sr| db_from_ratio(*f_per_sr).max(NOTHING_DB)).collect()
 }
 
 #[cfg(test)]

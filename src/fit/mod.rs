@@ -20,6 +20,7 @@
 pub mod again;
 mod angle;
 pub mod bistatic;
+pub(crate) mod by_parts;
 pub(crate) mod coordinates;
 mod error;
 pub(crate) mod gamma_law;

@@ -239,7 +239,12 @@ impl Correlation {
             let n_real = f64::from(n);
             n_real * ln_g - g - ln_factorial(n) + self.spectrum_ln(n_real, across, beam)
         };
-        let peak = first_fall(|n| term_ln(n + 1) <= term_ln(n));
+        let peak = first_fall(|n| {
+            let n = f64::from(n);
+            // Not a number where both vanish.
+            let growth = g / (n + 1.0) * self.growth(n, across, beam);
+            growth.is_nan() || growth <= 1.0
+        });
         let largest = term_ln(peak).exp();
         if largest == 0.0 {
             return 0.0;
@@ -268,6 +273,24 @@ impl Correlation {
             sum += share;
         }
         largest * sum
+    }
+
+    /// W_{n+1} over W_n.
+    fn growth(self, n: f64, across: f64, beam: f64) -> f64 {
+        let across2 = across * across;
+        match self {
+            Correlation::Gaussian => {
+                let [width, next] = [n + beam, n + 1.0 + beam];
+                width / next * (0.25 * across2 * (1.0 / width - 1.0 / next)).exp()
+            }
+            Correlation::Exponential if beam < UNSEEN * (n * n + across2) => {
+                let narrower = (n * n + across2) / ((n + 1.0) * (n + 1.0) + across2);
+                (n + 1.0) / n * narrower * narrower.sqrt()
+            }
+            Correlation::Exponential => {
+                seen_exponential(n + 1.0, across2, beam) / seen_exponential(n, across2, beam)
+            }
+        }
     }
 
     /// W_n over the one whose W_n/l² has this logarithm.

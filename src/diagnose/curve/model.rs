@@ -11,6 +11,7 @@ use super::points::Kind;
 use super::points::{Point, Points};
 use super::terms::Term;
 use crate::brdf::{Brdf, Scattering};
+use crate::fit::by_parts::ByParts;
 use crate::fit::coordinates::{Coordinates, frequencies};
 use crate::fit::minimise::{Local, Minimise, Minimum, step_each};
 use crate::fit::uncertainty::deviations;
@@ -122,7 +123,9 @@ impl Model {
     /// 10·lg f at every point.
     pub fn levels_db(&self, at: &DVector<f64>, points: &[Point]) -> Vec<f64> {
         let (law, values) = self.numbers(at);
-        self.with_terms(&law, &of_law(&law, points), &values, points)
+        let f_per_sr: Vec<f64> =
+            points.iter().map(|point| law.f_per_sr(point.i, point.o)).collect();
+        self.with_terms(&law, &f_per_sr, &values, points)
     }
 
     /// 10·lg f of a law with the terms of these parameters at every point; `f_per_sr` is that of the law alone.
@@ -198,15 +201,14 @@ impl Model {
         points: &[Point],
         scale_db: f64,
     ) -> Local {
+        let directions: Vec<_> = points.iter().map(|point| [point.i, point.o]).collect();
         let (law, values) = self.numbers(at);
-        let f_per_sr = of_law(&law, points);
-        let here = self.with_terms(&law, &f_per_sr, &values, points);
+        let by_parts = ByParts::new(&law, &directions);
+        let here = self.with_terms(&law, &by_parts.f_per_sr(), &values, points);
         let moved = step_each(at, upper, STEP, |there| {
-            let (moved, values) = self.numbers(there);
-            if moved == law {
-                return self.with_terms(&law, &f_per_sr, &values, points);
-            }
-            self.with_terms(&moved, &of_law(&moved, points), &values, points)
+            let (law, values) = self.numbers(there);
+            let f_per_sr = by_parts.moved_to(&law, &directions).f_per_sr();
+            self.with_terms(&law, &f_per_sr, &values, points)
         });
         let mut sum = Local::zero(at.len());
         for (row, (point, level_db)) in points.iter().zip(&here).enumerate() {
@@ -248,11 +250,6 @@ impl Model {
         }
         all
     }
-}
-
-/// f of a law at every point, 1/sr.
-fn of_law(law: &Brdf, points: &[Point]) -> Vec<f64> {
-    points.iter().map(|point| law.f_per_sr(point.i, point.o)).collect()
 }
 
 /// −ln p of points about a model's levels, dB.
