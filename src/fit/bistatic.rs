@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::by_parts::ByParts;
 use super::coordinates::{Coordinates, frequencies};
 use super::error::FitError;
-use super::minimise::{Local, Minimise, Stop, step_each};
+use super::minimise::{Local, Minimise, Minimum, Stop, step_each};
 use super::search::drawn_start;
 use crate::brdf::{Brdf, Scattering};
 use crate::frames::{Direction, Surface};
@@ -32,13 +32,15 @@ pub struct Sample {
 pub struct Bistatic {
     /// Points that the search starts from, 1 to 1000: the given model first, then drawn around it.
     pub starts: usize,
+    /// Starts that are followed to their end, those that lead furthest in twenty steps.
+    pub followed: usize,
     /// Seed of the drawn starts.
     pub seed: u64,
 }
 
 impl Default for Bistatic {
     fn default() -> Self {
-        Bistatic { starts: 8, seed: 0 }
+        Bistatic { starts: 8, followed: 3, seed: 0 }
     }
 }
 
@@ -60,6 +62,8 @@ pub struct BistaticResult {
 /// Level of a model that scatters nothing, dB.
 const NOTHING_DB: f64 = -200.0;
 const SEARCH: Minimise = Minimise { iterations: 300, tolerance: 1e-6, patience: usize::MAX };
+/// The first steps from every start.
+const BRIEF: Minimise = Minimise { iterations: 20, ..SEARCH };
 /// Step of the derivatives in the search.
 const STEP: f64 = 1e-6;
 
@@ -72,30 +76,36 @@ impl Bistatic {
         let coordinates = Coordinates::of_pairs(start, &frequencies(start), &[], Some(1.0))?;
         self.validate(samples, coordinates.len())?;
         let bounds = [coordinates.lower(), coordinates.upper()];
-        // The rms of every start with where it ended, the given start first.
-        let mut found = Vec::new();
-        for number in 0..self.starts {
-            let start = match number {
-                0 => coordinates.start(),
-                _ => drawn_start(&coordinates, self.seed, number),
-            };
-            let end = SEARCH.run_with(
-                &start,
+        let search = |search: Minimise, start: &DVector<f64>| {
+            search.run_with(
+                start,
                 [&bounds[0], &bounds[1]],
                 |at| half_squares(&levels_db(&coordinates.model(at), samples), samples),
                 |at| local(&coordinates, samples, at),
-            );
-            found.push(((2.0 * end.local.value / samples.len() as f64).sqrt(), end));
+            )
+        };
+        let cost = |end: &Minimum| end.local.value;
+        let mut ends: Vec<Minimum> = (0..self.starts)
+            .map(|number| match number {
+                0 => coordinates.start(),
+                _ => drawn_start(&coordinates, self.seed, number),
+            })
+            .map(|start| search(BRIEF, &start))
+            .collect();
+        ends.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
+        for end in ends.iter_mut().take(self.followed).filter(|end| end.stop == Stop::Iterations) {
+            *end = search(SEARCH, &end.at);
         }
-        let Some((rms_db, best)) = found.iter().min_by(|(a, _), (b, _)| a.total_cmp(b)) else {
+        let Some(best) = ends.iter().min_by(|a, b| cost(a).total_cmp(&cost(b))) else {
             return Err(FitError::Empty);
         };
+        let rms_db = |end: &Minimum| (2.0 * cost(end) / samples.len() as f64).sqrt();
         Ok(BistaticResult {
             model: coordinates.model(&best.at),
-            rms_db: *rms_db,
+            rms_db: rms_db(best),
             converged: best.converged(),
             stop: best.stop,
-            agreeing_starts: found.iter().filter(|(rms, _)| *rms <= 1.01 * rms_db).count(),
+            agreeing_starts: ends.iter().filter(|end| rms_db(end) <= 1.01 * rms_db(best)).count(),
         })
     }
 
