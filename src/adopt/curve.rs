@@ -217,26 +217,31 @@ pub fn add_curve(
 
 /// The curve of a material that has these points.
 fn same_points<'a>(material: &'a Material, curve: &measure::Curve) -> Option<&'a Curve> {
-    let is_same = |known: &measure::Curve| {
-        let rows = || known.observations.iter().zip(&curve.observations);
-        known.illumination == curve.illumination
-            && known.observations.len() == curve.observations.len()
-            && rows().all(|(known, row)| is_same_point(known, row))
-    };
     let mut known = material.curves.iter();
-    known.find(|known| measure::Curve::of_material(known).is_ok_and(|known| is_same(&known)))
+    known.find(|known| {
+        measure::Curve::of_material(known).is_ok_and(|known| {
+            known.illumination == curve.illumination
+                && known.observations.len() == curve.observations.len()
+                && std::iter::zip(&known.observations, &curve.observations)
+                    .all(|(known, row)| is_same_point(known, row))
+        })
+    })
 }
 
 /// Whether two points differ in nothing that both state: earlier versions stored numbers that a file did not have.
 fn is_same_point(known: &Observation, row: &Observation) -> bool {
-    let with = |one: &Observation, other: &Observation| Observation {
-        theta_sd_rad: one.theta_sd_rad.or(other.theta_sd_rad),
-        power_w: one.power_w.or(other.power_w),
-        range_m: one.range_m.or(other.range_m),
-        chirp: one.chirp.or(other.chirp),
-        ..*one
-    };
-    with(known, row) == with(row, known)
+    completed(known, row) == completed(row, known)
+}
+
+/// A point with what it does not state and another one does.
+fn completed(point: &Observation, other: &Observation) -> Observation {
+    Observation {
+        theta_sd_rad: point.theta_sd_rad.or(other.theta_sd_rad),
+        power_w: point.power_w.or(other.power_w),
+        range_m: point.range_m.or(other.range_m),
+        chirp: point.chirp.or(other.chirp),
+        ..*point
+    }
 }
 
 /// The curve or the fit of a material that has this name, in words.

@@ -66,6 +66,8 @@ const SEARCH: Minimise = Minimise { iterations: 300, tolerance: 1e-6, patience: 
 const BRIEF: Minimise = Minimise { iterations: 20, ..SEARCH };
 /// Step of the derivatives in the search.
 const STEP: f64 = 1e-6;
+/// Rms over the best up to which a start counts as one that agrees.
+const ALIKE: f64 = 1.01;
 
 impl Bistatic {
     /// Fits a model, starting at it as given.
@@ -84,7 +86,6 @@ impl Bistatic {
                 |at| local(&coordinates, samples, at),
             )
         };
-        let cost = |end: &Minimum| end.local.value;
         let mut ends: Vec<Minimum> = (0..self.starts)
             .map(|number| match number {
                 0 => coordinates.start(),
@@ -92,20 +93,20 @@ impl Bistatic {
             })
             .map(|start| search(BRIEF, &start))
             .collect();
-        ends.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
+        ends.sort_by(|a, b| a.local.value.total_cmp(&b.local.value));
         for end in ends.iter_mut().take(self.followed).filter(|end| end.stop == Stop::Iterations) {
             *end = search(SEARCH, &end.at);
         }
-        let Some(best) = ends.iter().min_by(|a, b| cost(a).total_cmp(&cost(b))) else {
+        let Some(best) = ends.iter().min_by(|a, b| a.local.value.total_cmp(&b.local.value)) else {
             return Err(FitError::Empty);
         };
-        let rms_db = |end: &Minimum| (2.0 * cost(end) / samples.len() as f64).sqrt();
+        let alike = best.local.value * ALIKE.powi(2);
         Ok(BistaticResult {
             model: coordinates.model(&best.at),
-            rms_db: rms_db(best),
+            rms_db: (2.0 * best.local.value / samples.len() as f64).sqrt(),
             converged: best.converged(),
             stop: best.stop,
-            agreeing_starts: ends.iter().filter(|end| rms_db(end) <= 1.01 * rms_db(best)).count(),
+            agreeing_starts: ends.iter().filter(|end| end.local.value <= alike).count(),
         })
     }
 

@@ -112,10 +112,10 @@ impl Table {
             sigma0.push(4.0 * PI * f_per_sr * v.cos_theta().powi(2));
         }
         let seen = ThroughBeam { law, beam_rad };
-        let of_pair = |&[i, o]: &[Direction<Surface>; 2]| {
-            4.0 * PI * seen.f_per_sr(i, o) * i.cos_theta() * o.cos_theta()
-        };
-        sigma0.par_extend(aspects.pairs.par_iter().with_min_len(PAIRS_AT_ONCE).map(of_pair));
+        let pairs = aspects.pairs.par_iter().with_min_len(PAIRS_AT_ONCE);
+        sigma0.par_extend(
+            pairs.map(|&[i, o]| 4.0 * PI * seen.f_per_sr(i, o) * i.cos_theta() * o.cos_theta()),
+        );
         let ln_sigma0 = sigma0.into_iter().map(f64::ln);
         let ln_sigma0 =
             ln_sigma0.map(|ln| if ln.is_nan() { LN_NOTHING } else { ln.max(LN_NOTHING) });

@@ -151,9 +151,6 @@ impl Curve {
         }
         let mut text = format!("{}{names}\n", COLUMNS.join(","));
         for o in &self.observations {
-            let cell = |value: Option<f64>, decimals| {
-                value.map_or(String::new(), |value| format!("{value:.decimals$}"))
-            };
             let [xt_m, yt_m] = o.target_m.map_or_else(Default::default, |place| {
                 place.map(|metres| format!("{:.5}", metres + 0.0))
             });
@@ -183,6 +180,11 @@ impl Curve {
     pub fn detected(&self) -> impl Iterator<Item = &Observation> {
         self.observations.iter().filter(|o| !o.is_censored())
     }
+}
+
+/// A number in a cell; nothing where there is none.
+fn cell(value: Option<f64>, decimals: usize) -> String {
+    value.map_or(String::new(), |value| format!("{value:.decimals$}"))
 }
 
 /// σ⁰, or its limit, of an observation that belongs in a curve; `index` from 0.

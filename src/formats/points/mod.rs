@@ -240,9 +240,11 @@ fn text(bytes: &[u8]) -> Result<csv::Table, FormatError> {
 /// Whether the first line is the number of points, as scanners write it in a `.pts`, and the second has more than that.
 fn begins_with_a_count(bytes: &[u8]) -> bool {
     let mut lines = bytes.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii);
-    let is_count =
-        |line: &[u8]| !line.is_empty() && line.len() < 20 && line.iter().all(u8::is_ascii_digit);
     lines.next().is_some_and(is_count) && lines.next().is_some_and(|line| !is_count(line))
+}
+
+fn is_count(line: &[u8]) -> bool {
+    (1..20).contains(&line.len()) && line.iter().all(u8::is_ascii_digit)
 }
 
 #[cfg(test)]

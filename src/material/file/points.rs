@@ -143,18 +143,23 @@ pub fn points(bytes: &[u8], names: &ColumnNames) -> Result<Points, FormatError> 
     Ok(Points { rows, sd_db, is_in_plane, illumination, passed_over, notices })
 }
 
+/// The numbers by which two points are told apart.
+fn bits(point: &Observation) -> [Option<u64>; 9] {
+    let Observation { sigma0, threshold_sigma0, range_m, chirp, target_m, .. } = *point;
+    let Aspect { theta_i_rad, theta_r_rad, delta_phi_rad } = point.aspect();
+    let [xt_m, yt_m] = target_m.map_or([None; 2], |place| place.map(Some));
+    let angles = [theta_i_rad, theta_r_rad, delta_phi_rad].map(Some);
+    let [a, b, c] = angles.map(|angle| angle.map(f64::to_bits));
+    let [d, e, f, g, h] =
+        [sigma0, threshold_sigma0, range_m, xt_m, yt_m].map(|x| x.map(f64::to_bits));
+    [a, b, c, d, e, f, g, h, chirp.map(u64::from)]
+}
+
 /// That many rows say exactly what another one says.
 fn copies(rows: &[(usize, Observation)]) -> Option<String> {
     /// Levels of few digits coincide at repeated angles.
     const BY_CHANCE: usize = 10;
-    let key = |point: &Observation| {
-        let Observation { sigma0, threshold_sigma0, range_m, chirp, target_m, .. } = *point;
-        let Aspect { theta_i_rad, theta_r_rad, delta_phi_rad } = point.aspect();
-        let angles = [theta_i_rad, theta_r_rad, delta_phi_rad].map(f64::to_bits);
-        let levels = [sigma0, threshold_sigma0, range_m].map(|x| x.map(f64::to_bits));
-        (angles, levels, chirp, target_m.map(|place| place.map(f64::to_bits)))
-    };
-    let different: HashSet<_> = rows.iter().map(|(_, point)| key(point)).collect();
+    let different: HashSet<_> = rows.iter().map(|(_, point)| bits(point)).collect();
     let copies = rows.len() - different.len();
     (copies * BY_CHANCE > rows.len()).then(|| {
         format!(
