@@ -39,11 +39,21 @@ impl Scene {
     }
 
     /// Loads what a scene file describes; relative paths start from the folder of `path`.
-    pub fn resolve(mut file: SceneFile, path: &Path) -> Result<Scene, SceneError> {
+    pub fn resolve(file: SceneFile, path: &Path) -> Result<Scene, SceneError> {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        Scene::resolve_with(file, path, |name| {
+            read_regular(&folder.join(name)).map_err(|e| e.to_string())
+        })
+    }
+
+    /// The same with the bytes of the file of rays from elsewhere.
+    pub(crate) fn resolve_with(
+        mut file: SceneFile,
+        path: &Path,
+        read_csv: impl Fn(&str) -> Result<Vec<u8>, String>,
+    ) -> Result<Scene, SceneError> {
         let at = |error| SceneError::Radar { file: path.to_owned(), error };
         file.radar.validate().map_err(at)?;
-        let folder = path.parent().unwrap_or(Path::new(""));
-        let read_csv = |name: &str| read_regular(&folder.join(name)).map_err(|e| e.to_string());
         let chirps = Chirps::draw(&file.radar, read_csv).map_err(at)?;
         let pixel_m = pixel_m(&file);
         if file.name.chars().count() > 200 {

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use crate::error::Error;
-use crate::files::{FilesError, write_all};
 use crate::formats::words::significant;
 use crate::frames::{Global, Point};
 use crate::material::Scale;
@@ -217,11 +216,8 @@ impl NewScene<'_> {
         std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
     }
 
-    /// The scene, from a folder of its own.
+    /// The scene as these files will have it.
     fn load(&self, files: &[(String, Vec<u8>)]) -> Result<Scene, Error> {
-        let folder = tempfile::tempdir()
-            .map_err(|reason| FilesError::unreadable(&std::env::temp_dir(), reason))?;
-        write_all(folder.path(), &files[1..])?;
         let text = String::from_utf8_lossy(&files[0].1);
         let mut file = SceneFile::parse(&text)
             .map_err(|error| SceneError::Format { file: self.scene_file.to_owned(), error })?;
@@ -229,7 +225,8 @@ impl NewScene<'_> {
             let path = std::path::absolute(&mesh.file);
             mesh.file = path.map_or(mesh.file.clone(), |path| path.display().to_string());
         }
-        Ok(Scene::resolve(file, &folder.path().join(&files[0].0))?)
+        let rays = files.get(1).map(|(_, bytes)| bytes.clone()).unwrap_or_default();
+        Ok(Scene::resolve_with(file, self.scene_file, |_| Ok(rays.clone()))?)
     }
 }
 

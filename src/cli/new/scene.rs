@@ -64,7 +64,7 @@ pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let (how, scene) = (&made.how, args.output.display());
     let names: Vec<&str> = made.files.iter().map(|(name, _)| name.as_str()).collect();
     let text = format!(
-        "the radar stood at {x:.3}, {y:.3}, {z:.3} m ({how})\nwrote {}: read its comments, then run\n  \
+        "the radar stood at {x:.3}, {y:.3}, {z:.3} m ({how})\nwrote {}: its power, loss and beam are the preset's until you put in yours; then run\n  \
          matdb measure {} --scene {scene}{} -o measured\n",
         names.join(" and "),
         args.cloud.cloud.display(),
