@@ -329,6 +329,12 @@ fn a_foreign_curve_is_fitted_compared_and_stored() {
     assert!(error.contains("rank by shape (--shape)"), "{error}");
     let near = said(at, "near --curve relative.csv --shape --measured-at 300");
     assert!(near.contains("ranked by shape, its level left open"), "{near}");
+    let add = "add --from relative.csv --name unknown-unit --class paint --kind synthetic --source drawn --licence CC0-1.0 --frequency 300";
+    assert!(said(at, add).contains("added unknown-unit"));
+    let near = said(at, &format!("near --curve sea.csv {columns} --measured-at 300 --limit 90"));
+    let marked: Vec<&str> =
+        near.lines().filter(|line| line.contains("its level is relative")).collect();
+    assert!(marked.len() == 1 && marked[0].starts_with("unknown-unit"), "{near}");
     // What is stored is found again by its own fit.
     let saved = said(at, "fit plane --model lambert --save");
     assert!(saved.contains("stored as fit"), "{saved}");

@@ -136,6 +136,9 @@ fn row(near: &Neighbour, record: &NeighbourReport) -> [String; 9] {
     {
         notes.push(format!("converted to footprint {}", own.as_str()));
     }
+    if near.is_relative {
+        notes.push("its level is relative: only its shape counts".to_owned());
+    }
     if near.status != "active" {
         notes.push(near.status.clone());
     }

@@ -47,6 +47,9 @@ pub struct Neighbour {
     /// Whether what scenes render of it is a curve or belongs to one.
     #[serde(skip)]
     pub is_of_a_curve: bool,
+    /// Whether the levels of that curve are relative, so that only its shape can be compared.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub is_relative: bool,
     /// Form of the footprint of that curve; none where it is not stated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub footprint: Option<Footprint>,
@@ -200,6 +203,7 @@ impl NeighbourSearch {
             frequency_ghz: material.frequency_hz.map(|hz| rounded(hz / 1e9)),
             frequency_outside_ghz: outside_hz.map(|hz| rounded(hz / 1e9)),
             is_of_a_curve: curve.is_some(),
+            is_relative: curve.is_some_and(|curve| curve.illumination.relative),
             footprint: curve.and_then(|curve| curve.illumination.footprint),
             distance,
         }))
