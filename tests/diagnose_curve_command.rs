@@ -116,7 +116,7 @@ fn what_means_nothing_is_refused_in_a_sentence() {
     let at = folder.path();
     fs::write(at.join("coating.csv"), table("", &[])).unwrap();
     fs::write(at.join("bad.csv"), "theta_i_deg,theta_s_deg,brdf_per_sr\n10,20,-1\n").unwrap();
-    fs::write(at.join("bad.bsdf"), "Source Measured\nAngleOfIncidence 1\n20\n").unwrap();
+    fs::write(at.join("bad.bsdf"), "Source Measured\n").unwrap();
     fs::write(at.join("few.csv"), "theta_deg,sigma0_db\n0,1\n10,0\n").unwrap();
     let sweep = (1..40).map(|k| format!("{0},{0},{1}\n", 2 * k, 0.3 + 0.001 * f64::from(k * k)));
     let head = "theta_i_deg,theta_s_deg,brdf_per_sr\n".to_owned();

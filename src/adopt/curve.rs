@@ -7,6 +7,7 @@ use crate::error::Error;
 use crate::material::form::is_licence;
 use crate::material::{Curve, Instrument, Material, Observation, SourceKind};
 use crate::measure;
+use crate::units::{range, shown};
 
 /// What is stated of a curve that is to be stored: where it comes from and what it was measured with.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -76,6 +77,20 @@ impl CurveOrigin {
                 "leave frequency and threshold out, or name another instrument",
             ));
         }
+        if let Some(hz) = self.frequency_hz_of(material)
+            && self.kind == Some(SourceKind::Measured)
+            && material.frequency_outside_hz(hz) > 0.0
+        {
+            let (slug, claimed) = (&material.slug, material.frequency_hz.map(|hz| hz / 1e9));
+            return Err(Error::usage(
+                format!(
+                    "the curve was measured at {} GHz and `{slug}` claims {} GHz",
+                    shown(hz / 1e9),
+                    range(claimed)
+                ),
+                "claim in frequency_ghz what was measured, or name the curve's own instrument",
+            ));
+        }
         let missing = self.missing(material);
         if missing.is_empty() {
             return Ok(());
@@ -85,6 +100,12 @@ impl CurveOrigin {
             _ => "the instrument of a curve",
         };
         Err(Error::Missing { what, missing })
+    }
+
+    /// At which the curve was measured, Hz.
+    fn frequency_hz_of(&self, material: &Material) -> Option<f64> {
+        let known = self.known_instrument(material).map(|known| known.centre_frequency_hz);
+        self.frequency_hz.or(known)
     }
 
     /// Whether an instrument has another frequency or threshold than is stated.
@@ -173,10 +194,16 @@ pub fn add_curve(
     let (kind, title) = origin.source(material)?;
     origin.check(material)?;
     let source = add_source(material, kind, title, name, origin.licence.as_deref());
-    if let Some(known) = same_points(material, curve) {
+    if let Some(place) = same_points(material, curve) {
+        let known = &mut material.curves[place];
         if known.source == source {
+            // What only one of the two states is kept.
+            let stated: Vec<Observation> = known.stated().collect();
+            let pairs = std::iter::zip(&stated, &curve.observations);
+            known.observations = pairs.map(|(known, row)| completed(known, row)).collect();
             return Ok(AddedCurve { curve: known.name.clone(), source });
         }
+        let known = &material.curves[place];
         let slug = &material.slug;
         return Err(Error::usage(
             format!(
@@ -208,17 +235,13 @@ pub fn add_curve(
             "name another instrument, with its frequency and its threshold",
         ));
     }
-    if let Some((problem, way_out)) = admission::strange_frequency(material, &curve) {
-        return Err(Error::usage(problem, way_out));
-    }
     material.curves.push(curve);
     Ok(AddedCurve { curve: name.to_owned(), source })
 }
 
-/// The curve of a material that has these points.
-fn same_points<'a>(material: &'a Material, curve: &measure::Curve) -> Option<&'a Curve> {
-    let mut known = material.curves.iter();
-    known.find(|known| {
+/// Which curve of a material has these points.
+fn same_points(material: &Material, curve: &measure::Curve) -> Option<usize> {
+    material.curves.iter().position(|known| {
         measure::Curve::of_material(known).is_ok_and(|known| {
             known.illumination == curve.illumination
                 && known.observations.len() == curve.observations.len()
@@ -228,7 +251,7 @@ fn same_points<'a>(material: &'a Material, curve: &measure::Curve) -> Option<&'a
     })
 }
 
-/// Whether two points differ in nothing that both state: earlier versions stored numbers that a file did not have.
+/// Whether two points differ in nothing that both state.
 fn is_same_point(known: &Observation, row: &Observation) -> bool {
     completed(known, row) == completed(row, known)
 }

@@ -169,10 +169,14 @@ impl<'a> FitRequest<'a> {
     }
 
     fn settings(&self, subject: &FitSubject, start: &Brdf) -> Result<Fit, Error> {
-        if self.noise_w.is_some() && subject.curve.lacks_power() {
+        let (lacking, rows) = (subject.curve.without_power(), subject.curve.observations.len());
+        if self.noise_w.is_some() && lacking > 0 {
             return Err(Error::usage(
-                format!("{} has no powers that noise could be compared with", subject.label),
-                "leave --noise-dbm out or give the curve a column power_dbm",
+                format!(
+                    "{lacking} of {rows} rows of {} have no power that noise could be compared with",
+                    subject.label
+                ),
+                "leave --noise-dbm out, or fill in power_dbm, in a row without a detection that of the threshold",
             ));
         }
         let method = match self.method {

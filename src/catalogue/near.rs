@@ -223,7 +223,9 @@ impl Probe {
         let common: Vec<&Bin> = self
             .bins
             .iter()
-            .filter(|bin| bin.aspects.iter().all(|aspect| claimed.contains(&aspect.theta_i_rad)))
+            .filter(|bin| {
+                bin.aspects.iter().all(|aspect| claimed.contains(&aspect.half_angle_rad()))
+            })
             .collect();
         let echoes = common.iter().filter(|bin| bin.level_db[0].is_finite()).count();
         let enough = echoes >= LEAST_COMMON && common.len() * 2 >= self.bins.len();

@@ -80,8 +80,7 @@ fn search(args: &Args, store: Option<&Store>) -> Result<(NeighbourSearch, Vec<St
 fn text(record: &NeighbourReport, args: &Args) -> String {
     let mut text = match record.materials.as_slice() {
         [] if record.left_out == 0 => {
-            return "no material is left by --frequency, --class and the other conditions\n"
-                .to_owned();
+            return "no material meets the conditions; leave one of them out\n".to_owned();
         }
         [] => "no material has enough angles in common with the curve\n".to_owned(),
         found => table(

@@ -44,7 +44,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let MaterialRevision { material, revision } =
         find_material(store.as_ref(), &args.material, "")?;
     let later = later_status_warning(store.as_ref(), &material.slug, revision)?;
-    later.iter().for_each(|later| console.notice(later));
+    later.iter().chain(&material.relative_words()).for_each(|notice| console.notice(notice));
     let prediction = Prediction::new(&material, revision, &args.angles.0)?;
     let mut text = text(&prediction);
     if let Some(path) = &args.output {

@@ -74,9 +74,10 @@ fn describe(material: &Material, origin: &str) -> Result<String, Error> {
     for curve in &material.curves {
         let censored = curve.observations.iter().filter(|o| o.sigma0.is_none()).count();
         text += &format!(
-            "\ncurve {}: {}, {censored} of them below the threshold, from {}{}\n    {}; {}\n",
+            "\ncurve {}: {}, {censored} of them below the threshold{}, from {}{}\n    {}; {}\n",
             curve.name,
             counted(curve.observations.len(), "point"),
+            if curve.illumination.relative { ", of relative levels" } else { "" },
             curve.source,
             curve.instrument.as_ref().map_or(String::new(), |key| format!(", by {key}")),
             curve.illumination.footprint_words(),
@@ -86,7 +87,7 @@ fn describe(material: &Material, origin: &str) -> Result<String, Error> {
     for fit in &material.fits {
         let lobes = fit.lobes_words().map_or(String::new(), |words| format!(", {words}"));
         text += &format!("\nfit {} ({}{lobes})\n{}", fit.name, fit.estimator, parameters(fit));
-        if let Some([specular, diffuse]) = fit.model.identified_products() {
+        if let Some([specular, diffuse]) = fit.identified_products() {
             text += &format!(
                 "a monostatic measurement tells only (1 − k)·f_lambda = {specular:.3e} and \
                  k·r_s = {diffuse:.3e}; k, f_lambda and r_s by themselves are a convention\n"

@@ -32,7 +32,7 @@ pub struct Sample {
 pub struct Bistatic {
     /// Points that the search starts from, 1 to 1000: the given model first, then drawn around it.
     pub starts: usize,
-    /// Starts that are followed to their end, those that lead furthest in twenty steps.
+    /// Starts that are followed to their end, 1 to `starts`: those that lead furthest in twenty steps.
     pub followed: usize,
     /// Seed of the drawn starts.
     pub seed: u64,
@@ -55,7 +55,7 @@ pub struct BistaticResult {
     pub converged: bool,
     /// Why it ended.
     pub stop: Stop,
-    /// Starts that came within 1 % of the best rms.
+    /// Of the starts that were followed, those that came within 1 % of the best rms.
     pub agreeing_starts: usize,
 }
 
@@ -106,7 +106,11 @@ impl Bistatic {
             rms_db: (2.0 * best.local.value / samples.len() as f64).sqrt(),
             converged: best.converged(),
             stop: best.stop,
-            agreeing_starts: ends.iter().filter(|end| end.local.value <= alike).count(),
+            agreeing_starts: ends
+                .iter()
+                .take(self.followed)
+                .filter(|end| end.local.value <= alike)
+                .count(),
         })
     }
 
@@ -114,6 +118,10 @@ impl Bistatic {
         if !(1..=1000).contains(&self.starts) {
             let value = self.starts as f64;
             return Err(FitError::Setting { name: "starts", value, min: 1.0, max: 1000.0 });
+        }
+        if !(1..=self.starts).contains(&self.followed) {
+            let (value, max) = (self.followed as f64, self.starts as f64);
+            return Err(FitError::Setting { name: "followed", value, min: 1.0, max });
         }
         if samples.is_empty() {
             return Err(FitError::Empty);
@@ -222,5 +230,9 @@ mod tests {
         assert!(message.contains("row 4") && message.contains("f_per_sr"), "{message}");
         let none = Bistatic { starts: 0, ..Bistatic::default() };
         assert!(none.run(&truth, &samples).unwrap_err().to_string().contains("fit.starts"));
+        for followed in [0, 9] {
+            let wrong = Bistatic { followed, ..Bistatic::default() };
+            assert!(wrong.run(&truth, &samples).unwrap_err().to_string().contains("fit.followed"));
+        }
     }
 }

@@ -20,7 +20,9 @@ pub(crate) const LOOKS: &str = "looks";
 /// Range of the levels: a lobe of m = 0.001 is a million times its level, and 10⁻¹² is then 60 dB below a mirror.
 const LEVEL_RANGE: (f64, f64) = (1e-12, 1.0);
 /// Range of the looks: from far stronger than fully developed speckle to practically no speckle.
-const LOOKS_RANGE: (f64, f64) = (0.1, 1e4);
+const LOOKS_RANGE: (f64, f64) = (0.1, MOST_LOOKS);
+/// Looks that are practically no speckle.
+pub(super) const MOST_LOOKS: f64 = 1e4;
 
 /// The scale on which a number is searched.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,6 +96,11 @@ impl Coordinate {
     /// The value at a point of the search, kept in its range.
     pub fn value(&self, searched: f64) -> f64 {
         self.scale.value(searched).clamp(self.min, self.max)
+    }
+
+    /// The bound that a value is nearer to.
+    pub fn nearer_bound(&self, value: f64) -> f64 {
+        if value - self.min < self.max - value { self.min } else { self.max }
     }
 
     /// Whether the coordinate is of the diffuse part of a mixture.

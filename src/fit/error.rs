@@ -92,16 +92,23 @@ pub enum FitError {
     /// A start or fixed value is out of range.
     #[error(transparent)]
     Parameter(#[from] ParameterError),
-    /// Relative levels that are above those of any law.
+    /// Relative levels that are above or below those of any law.
     #[error(
-        "the levels are relative and above those that any law has: {name} stopped at its bound {}, and the other numbers          follow it; lower all levels by the same 20 dB or more, which changes nothing else", shown(*bound)
+        "the levels are relative and not those that any law has: {name} stopped at the end of its range, and the other \
+         numbers follow it; {change} all levels by as much as it takes, 20 dB at a time: nothing else changes"
     )]
     RelativeLevels {
         /// The level that stopped.
         name: String,
-        /// Its bound.
-        bound: f64,
+        /// What to do with the levels.
+        change: &'static str,
     },
+    /// Relative levels in two directions.
+    #[error(
+        "the levels are relative, and how a law changes between two directions depends on how much it reflects; give \
+         levels in 1/sr, or the backscatter alone"
+    )]
+    RelativePairs,
     /// The model has no free parameter.
     #[error("nothing is left to fit; free a parameter or choose a model that has some")]
     NothingFree,

@@ -1,6 +1,6 @@
 //! The findings on a fit, from its rows, its numbers and their uncertainty.
 
-use super::coordinates::{DIFFUSE_LEVEL, LOOKS, SPECULAR_LEVEL};
+use super::coordinates::{DIFFUSE_LEVEL, LOOKS, MOST_LOOKS, SPECULAR_LEVEL};
 use super::goodness::correlation_of_neighbours;
 use super::interval::DEVIATE_95;
 use super::result::FitResult;
@@ -93,11 +93,8 @@ fn is_level_at_bound(finding: &Finding) -> bool {
 /// Whether the levels scatter less about the model than the most looks leave: of levels without noise no law of speckle
 /// says whether a model explains them, and what is left of them is rounding.
 fn scatters_less_than_any_speckle(result: &FitResult) -> bool {
-    let looks = result.estimates.iter().zip(&result.coordinates.list);
-    let mut looks = looks.filter(|(estimate, _)| estimate.name == LOOKS);
-    looks.any(|(estimate, coordinate)| {
-        estimate.value == coordinate.max && result.goodness.z_variance < 1.0
-    })
+    let looks = result.estimate(LOOKS).map_or(0.0, |looks| looks.value);
+    looks >= 0.999 * MOST_LOOKS && result.goodness.z_variance < 1.0
 }
 
 /// That residuals of neighbouring angles are alike.
@@ -198,8 +195,10 @@ fn judge_numbers(result: &FitResult, found: &SearchResult) -> Vec<Finding> {
     for &index in &uncertainty.loose {
         findings.push(Finding::Unconstrained { name: name(estimates, index) });
     }
-    for (estimate, _) in estimates.iter().zip(&uncertainty.bounded).filter(|(_, held)| **held) {
-        findings.push(Finding::AtBound { name: estimate.name.clone(), value: estimate.value });
+    let pairs = estimates.iter().zip(&result.coordinates.list);
+    for ((estimate, coordinate), _) in pairs.zip(&uncertainty.bounded).filter(|(_, held)| **held) {
+        let value = coordinate.nearer_bound(estimate.value);
+        findings.push(Finding::AtBound { name: estimate.name.clone(), value });
     }
     findings.extend(judge_correlations(estimates, uncertainty));
     for (index, profile) in found.profiles.iter().enumerate() {

@@ -4,6 +4,7 @@ use super::coordinates::{Coordinates, DIFFUSE_LEVEL, LOOKS, SPECULAR_LEVEL};
 use super::error::FitError;
 use super::parts::Parts;
 use super::result::FitResult;
+use super::search::SearchResult;
 use super::settings::{Fit, Method};
 use super::summary::summarise;
 use crate::brdf::Brdf;
@@ -30,6 +31,9 @@ impl Fit {
         };
         let are_retro = curve.observations.iter().all(Observation::is_retro);
         let of = if are_retro { Coordinates::new } else { Coordinates::of_pairs };
+        if curve.illumination.relative && !are_retro {
+            return Err(FitError::RelativePairs);
+        }
         let mut coordinates =
             of(start, &self.fixed, &self.bounds, looks)?.seen_by(self.beam_rad.unwrap_or(0.0));
         if self.method == Method::Censored {
@@ -49,23 +53,45 @@ impl Fit {
         }
         let found = self.search(&coordinates, &curve.observations);
         let result = summarise(self, coordinates, &found, curve);
-        match stopped_level(&result).filter(|_| curve.illumination.relative) {
-            Some((name, bound)) => Err(FitError::RelativeLevels { name, bound }),
+        match stopped_level(&result, &found).filter(|_| curve.illumination.relative) {
+            Some((name, most)) => {
+                let change = if most { "lower" } else { "raise" };
+                Err(FitError::RelativeLevels { name, change })
+            }
             None => Ok(result),
         }
     }
 }
 
-/// A level of the model that stopped at the upper end of its range, and that.
-fn stopped_level(result: &FitResult) -> Option<(String, f64)> {
+/// A level of the model that stopped at the end of its range though the fit would improve beyond it, and whether it is the
+/// upper end.
+fn stopped_level(result: &FitResult, found: &SearchResult) -> Option<(String, bool)> {
     const LEVELS: [&str; 5] = [SPECULAR_LEVEL, DIFFUSE_LEVEL, "albedo", "r_s", "f_lambda"];
-    let pairs = result.estimates.iter().zip(&result.coordinates.list);
-    let mut stopped = pairs.filter(|(estimate, coordinate)| {
-        let name = estimate.name.rsplit('.').next().unwrap_or_default();
-        LEVELS.contains(&name) && estimate.sd.is_none() && estimate.value == coordinate.max
+    /// The way there and back through the scale of the search rounds.
+    const NEARLY_1: f64 = 1.0 - 1e-9;
+    let gradient = found.best.local.gradient.iter();
+    let levels = result.estimates.iter().zip(&result.coordinates.list).zip(gradient);
+    let levels = levels.filter(|((estimate, _), _)| {
+        LEVELS.contains(&estimate.name.rsplit('.').next().unwrap_or_default())
     });
-    stopped.next().map(|(estimate, coordinate)| (estimate.name.clone(), coordinate.max))
+    let above =
+        levels.clone().find(|((estimate, _), slope)| estimate.value >= NEARLY_1 && **slope < 0.0);
+    if let Some(((estimate, _), _)) = above {
+        return Some((estimate.name.clone(), true));
+    }
+    // One part may be absent, but not all of them.
+    let mut first = None;
+    for ((estimate, coordinate), slope) in levels {
+        if estimate.value > coordinate.min.max(1e-9) || *slope <= 0.0 {
+            return None;
+        }
+        first = first.or(Some((estimate.name.clone(), false)));
+    }
+    first
 }
+
+/// Detections at larger angles than this, 89.9°, no law explains.
+const GRAZING_RAD: f64 = 1.569;
 
 fn check_rows(rows: &[Observation]) -> Result<(), FitError> {
     if rows.is_empty() {
@@ -85,6 +111,14 @@ fn check_row(row: usize, observation: &Observation) -> Result<(), FitError> {
     ] {
         if !(0.0..=QUARTER_RAD).contains(&value) {
             return Err(FitError::Row { row, name, value, wanted: "not from 0 to π/2" });
+        }
+    }
+    for (name, value) in
+        [("theta_rad", observation.theta_i_rad), ("theta_r_rad", observation.theta_r_rad)]
+    {
+        if value > GRAZING_RAD && !observation.is_censored() {
+            let wanted = "at grazing incidence, where no law returns anything";
+            return Err(FitError::Row { row, name, value, wanted });
         }
     }
     if !observation.delta_phi_rad.is_finite() {
@@ -286,7 +320,30 @@ mod tests {
         };
         let error = raised(1e6).unwrap_err();
         assert!(error.to_string().contains("lower all levels"), "{error}");
+        let flat = Brdf::Lambert(Lambert { albedo: 0.5 });
+        let sum = Brdf::Sum(crate::brdf::Sum { parts: vec![flat.clone(), start()] });
+        let bright = |law: &Brdf| {
+            let mut curve = Curve::default();
+            curve.illumination.relative = true;
+            curve.observations = (0..40)
+                .map(|k| {
+                    let theta_rad = 0.02 * f64::from(k);
+                    let level = 300.0 * theta_rad.cos().powi(2) * (1.0 + 0.1 * f64::from(k % 3));
+                    Observation::backscatter(theta_rad, Some(level), None)
+                })
+                .collect();
+            quick().run(law, &curve).unwrap_err()
+        };
+        for (law, name) in [(&flat, "albedo"), (&sum, "0.albedo")] {
+            let name = name.to_owned();
+            assert_eq!(bright(law), FitError::RelativeLevels { name, change: "lower" });
+        }
+        assert!(raised(1e-20).unwrap_err().to_string().contains("raise all levels"));
         let [own, lowered] = [1.0, 0.1].map(|by| raised(by).unwrap());
+        let mut pairs = Twin { rows: 40, ..Twin::default() }.curve(1);
+        pairs.illumination.relative = true;
+        pairs.observations[3].theta_r_rad = 0.0;
+        assert_eq!(quick().run(&start(), &pairs).unwrap_err(), FitError::RelativePairs);
         let alpha = |result| value(result, "diffuse.alpha");
         assert!((alpha(&own) - alpha(&lowered)).abs() < 1e-3, "{}", alpha(&lowered));
     }

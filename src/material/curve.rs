@@ -177,6 +177,24 @@ impl Censor {
 const SAME_ANGLE_RAD: f64 = 1e-12;
 
 impl Curve {
+    /// The points as they were stated.
+    pub fn stated(&self) -> impl Iterator<Item = Observation> {
+        let is_made_up = self.has_made_up_details();
+        self.observations.iter().map(move |o| if is_made_up { o.bare() } else { *o })
+    }
+
+    /// Whether every point has the details that versions before 0.2.0 made up for a file that did not state them: an exact
+    /// angle, σ⁰ in watts as its power, a range of 0, and its number as the chirp.
+    fn has_made_up_details(&self) -> bool {
+        self.observations.iter().enumerate().all(|(index, o)| {
+            o.theta_sd_rad == Some(0.0)
+                && o.power_w.is_some()
+                && o.power_w == o.level_sigma0()
+                && o.range_m == Some(0.0)
+                && o.chirp.is_some_and(|chirp| chirp as usize == index)
+        })
+    }
+
     /// The curve as a scattering model: its detections in backscatter, sorted by angle, equal angles
     /// averaged in linear σ⁰. Where only left-censored points follow, nothing comes back.
     ///
@@ -234,6 +252,11 @@ impl Observation {
     pub fn of_level(theta_rad: f64, sigma0: f64, is_censored: bool) -> Self {
         let (level, limit) = if is_censored { (None, Some(sigma0)) } else { (Some(sigma0), None) };
         Observation::backscatter(theta_rad, level, limit)
+    }
+
+    /// The point without the details of its measurement, but for its place.
+    fn bare(&self) -> Observation {
+        Observation { theta_sd_rad: None, power_w: None, range_m: None, chirp: None, ..*self }
     }
 
     /// The measured σ⁰, or the limit of a censored point; none where the point has neither.

@@ -125,6 +125,12 @@ impl Fit {
     /// The [`estimator`](Fit::estimator) of values that were not fitted.
     pub const STATED: &str = "stated";
 
+    /// The levels S and R of a mixture, of which alone backscatter tells; none for another model and where the data told k.
+    pub fn identified_products(&self) -> Option<[f64; 2]> {
+        let told = self.report.as_ref().is_some_and(|report| report.estimate("k").is_some());
+        self.model.identified_products().filter(|_| !told)
+    }
+
     /// Divergence of the beam with which the curve was fitted, rad; none for a fit without one, or without a report.
     pub fn beam_rad(&self) -> Option<f64> {
         let given = &self.report.as_ref()?.given;

@@ -4,7 +4,6 @@ use serde::{Deserialize, Serialize};
 
 use super::error::{MaterialError, value};
 use super::form::is_hash;
-use crate::radar::speckle::mean_offset_db;
 
 /// The record of one fit to one curve.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -109,7 +108,7 @@ pub struct Goodness {
     pub rms_db: f64,
     /// Mean of detections over the model, dB.
     pub mean_db: f64,
-    /// The rms that speckle alone leaves to a perfect model, dB; none for least squares.
+    /// Standard deviation of speckle alone about its own mean, dB; none for least squares.
     pub speckle_db: Option<f64>,
     /// Mean of the normal residuals, 0 if the law is right.
     pub z_mean: f64,
@@ -121,17 +120,16 @@ pub struct Goodness {
     pub rows: u32,
 }
 
-impl FitReport {
-    /// How far the form of the law is off, dB rms: what speckle does not explain of the scatter about it, whose mean in
-    /// dB is below that of the power. 0 where that is no more than chance leaves in so many independent rows, two
-    /// standard deviations of their variance; none where the speckle is not known.
+impl Goodness {
+    /// How far the form of the law is off, dB rms: by how much the normal residuals, which count what was not detected, scatter
+    /// more than speckle does. Nearly so up to as much as the speckle itself; of a larger one it is too small. 0 where it is
+    /// no more than chance leaves in so many independent rows, two standard deviations of their variance; none where the
+    /// speckle is not known.
     pub fn form_error_db(&self) -> Option<f64> {
-        let Goodness { rms_db, mean_db, speckle_db, rows, .. } = self.goodness;
-        let noise_db2 = speckle_db?.powi(2);
-        let form_mean_db = mean_db - mean_offset_db(self.looks?);
-        let beyond_db2 = rms_db.powi(2) - mean_db.powi(2) + form_mean_db.powi(2) - noise_db2;
-        let chance_db2 = 2.0 * noise_db2 * (2.0 / f64::from(rows.max(1))).sqrt();
-        Some(if beyond_db2 > chance_db2 { beyond_db2.sqrt() } else { 0.0 })
+        let beyond = self.z_variance + self.z_mean.powi(2) - 1.0;
+        let chance = 2.0 * (2.0 / f64::from(self.rows.max(1))).sqrt();
+        let in_speckle = if beyond > chance { beyond.sqrt() } else { 0.0 };
+        self.speckle_db.map(|speckle_db| in_speckle * speckle_db)
     }
 }
 
@@ -231,32 +229,17 @@ mod tests {
 
     #[test]
     fn the_error_of_a_form_is_what_speckle_leaves_unexplained() {
-        let speckle_mean_db = mean_offset_db(1.0);
-        let form_error_db = |deviation_db: f64, mean_db: f64, rows, speckle_db| {
-            let goodness = Goodness {
-                rms_db: deviation_db.hypot(mean_db),
-                mean_db,
-                speckle_db,
-                z_mean: 0.0,
-                z_variance: 1.0,
-                ks_distance: 0.0,
-                rows,
-            };
-            FitReport { goodness, ..report() }.form_error_db()
+        let form_error_db = |z_variance, z_mean, rows, speckle_db| {
+            let goodness = Goodness { z_variance, z_mean, rows, speckle_db, ..report().goodness };
+            goodness.form_error_db()
         };
-        let beside = |deviation_db, rows| {
-            form_error_db(deviation_db, speckle_mean_db, rows, Some(3.0)).unwrap()
-        };
-        assert!((beside(5.0, 200) - 4.0).abs() < 1e-9);
+        assert_eq!(form_error_db(2.0, 0.0, 200, Some(3.0)), Some(3.0));
+        assert_eq!(form_error_db(1.0, 1.0, 200, Some(3.0)), Some(3.0));
         // 200 rows: the variance scatters by a tenth.
-        assert_eq!(beside(3.2, 200), 0.0);
-        assert!((beside(3.2, 20_000) - 1.1136).abs() < 1e-3);
-        assert_eq!(beside(2.0, 200), 0.0);
-        // The mean of a right law lies where speckle has it: 2.5 dB below that of the power.
-        let off_db = form_error_db(3.0, speckle_mean_db + 2.0, 20_000, Some(3.0)).unwrap();
-        assert!((off_db - 2.0).abs() < 1e-9, "{off_db}");
-        assert!(form_error_db(3.0, 0.0, 20_000, Some(3.0)).unwrap() > 2.5);
-        assert_eq!(form_error_db(5.0, 0.0, 200, None), None);
+        assert_eq!(form_error_db(1.15, 0.0, 200, Some(3.0)), Some(0.0));
+        assert!(form_error_db(1.15, 0.0, 20_000, Some(3.0)).unwrap() > 1.1);
+        assert_eq!(form_error_db(0.5, 0.0, 200, Some(3.0)), Some(0.0));
+        assert_eq!(form_error_db(2.0, 0.0, 200, None), None);
     }
 
     fn report() -> FitReport {

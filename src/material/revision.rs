@@ -112,6 +112,16 @@ impl Material {
         self.curve_behind(&self.render)
     }
 
+    /// That what scenes render of it has relative levels, in a sentence.
+    pub fn relative_words(&self) -> Option<String> {
+        let curve = self.rendered_curve().filter(|curve| curve.illumination.relative)?;
+        Some(format!(
+            "the levels of `{}`, curve `{}`, are relative, up to a factor that is not known: what scenes show of it is right in \
+             its shape over the angle alone",
+            self.slug, curve.name
+        ))
+    }
+
     /// The curve of this name, or the one that the fit of this name belongs to.
     pub fn curve_behind(&self, name: &str) -> Option<&Curve> {
         let fit = self.fits.iter().find(|fit| fit.name == name);

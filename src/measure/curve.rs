@@ -59,6 +59,14 @@ pub enum ObservationError {
         /// Its number from 1.
         point: usize,
     },
+    /// A detection below its threshold, where only detections were recorded.
+    #[error(
+        "point {point} (from 1) is below its own threshold, and only detections were recorded; correct one of the two"
+    )]
+    BelowThreshold {
+        /// Its number from 1.
+        point: usize,
+    },
     /// Neither a value nor a threshold.
     #[error("point {point} (from 1) has no value and no threshold; give it one")]
     Empty {
@@ -68,22 +76,20 @@ pub enum ObservationError {
 }
 
 impl Curve {
-    /// A material's curve.
+    /// A material's curve, without the details that earlier versions made up.
     ///
     /// # Errors
     /// The first observation that does not belong in a curve.
     pub fn of_material(curve: &material::Curve) -> Result<Curve, ObservationError> {
         let illumination = curve.illumination;
-        let rows = curve.observations.iter().enumerate();
-        let rows = rows.map(|(index, o)| checked(index, o, illumination.only_detected));
+        let rows = curve.stated().enumerate();
+        let rows = rows.map(|(index, o)| checked(index, &o, illumination.only_detected));
         Ok(Curve { observations: rows.collect::<Result<_, _>>()?, illumination })
     }
 
-    /// Whether an observation has no power, or all have σ⁰ in its place, as earlier versions stored it.
-    pub fn lacks_power(&self) -> bool {
-        let rows = &self.observations;
-        rows.iter().any(|o| o.power_w.is_none())
-            || rows.iter().all(|o| o.power_w == o.level_sigma0())
+    /// How many observations have no power.
+    pub fn without_power(&self) -> usize {
+        self.observations.iter().filter(|o| o.power_w.is_none()).count()
     }
 
     /// Reads a curve file, see [`Curve::read_as`], whose columns have our names.
@@ -101,11 +107,9 @@ impl Curve {
     /// The first cell that cannot be used, with its line and column.
     pub fn read_as(bytes: &[u8], names: &ColumnNames) -> Result<(Curve, Vec<String>), FormatError> {
         let table = points(bytes, names)?;
-        let has_deviations = table.sd_db.iter().any(Option::is_some);
+        let unused = table.unused_deviations();
         let (curve, mut notices) = Curve::of_points(table)?;
-        if has_deviations {
-            notices.push("the deviations in `sd_db` are not used here: speckle says how far a level scatters".to_owned());
-        }
+        notices.extend(unused);
         Ok((curve, notices))
     }
 
@@ -125,6 +129,11 @@ impl Curve {
                         "the row is above the instrument's range"
                     }
                     ObservationError::Empty { .. } => "the row has no value and no threshold",
+                    ObservationError::BelowThreshold { .. } => {
+                        let problem = "the level is below its own threshold, and only detections were recorded";
+                        let place = format!("line {line}, column threshold_db");
+                        return FormatError::at(place, problem, "correct one of the two");
+                    }
                     ObservationError::NoThreshold { .. } => {
                         let problem = "only detections were recorded, and the row has no threshold";
                         let way_out = "fill in the least σ⁰ that would have been detected";
@@ -205,10 +214,16 @@ fn checked(
     o: &Observation,
     only_detected: bool,
 ) -> Result<Observation, ObservationError> {
-    level_sigma0(index, o)?;
+    /// A tenth of a decibel, to which a file may round.
+    const ROUNDING: f64 = 0.977;
+    let sigma0 = level_sigma0(index, o)?;
     let threshold_sigma0 = o.threshold_sigma0.filter(|_| only_detected || o.is_censored());
     if only_detected && threshold_sigma0.is_none() {
         return Err(ObservationError::NoThreshold { point: index + 1 });
+    }
+    let least = threshold_sigma0.filter(|_| only_detected);
+    if least.is_some_and(|least| sigma0 < least * ROUNDING) {
+        return Err(ObservationError::BelowThreshold { point: index + 1 });
     }
     Ok(Observation { threshold_sigma0, ..*o })
 }

@@ -46,7 +46,7 @@ impl Scene {
         })
     }
 
-    /// The same with the bytes of the file of rays from elsewhere.
+    /// Loads what a scene file describes; `read_csv` gives the bytes of its file of rays.
     pub(crate) fn resolve_with(
         mut file: SceneFile,
         path: &Path,

@@ -271,7 +271,7 @@ impl ReadyScene {
         for SceneMaterial { found, .. } in &self.materials {
             notices.extend(extrapolation_warning(&found.material, self.scene.radar()));
             notices.extend(polarisation_warning(&found.material));
-            notices.extend(relative_warning(&found.material));
+            notices.extend(found.material.relative_words());
         }
         let earlier = self.scene.radar().speckle.and_then(|speckle| speckle.earlier);
         notices.extend(earlier.map(|earlier| earlier.to_string()));
@@ -487,18 +487,6 @@ fn find_effects(
 fn too_much(material: &SceneMaterial) -> Option<String> {
     let excess = Excess::of(&material.scattering, material.found.material.theta_rad)?;
     Some(format!("the law of `{}` {}; nothing is cut off", material.name, excess.words()))
-}
-
-/// A curve of relative levels says nothing of how much returns.
-fn relative_warning(material: &Material) -> Option<String> {
-    let curve = material.rendered_curve()?;
-    curve.illumination.relative.then(|| {
-        format!(
-            "the levels of `{}` are relative, up to a factor that is not known: what scenes show of it is right in its shape \
-             over the angle alone",
-            material.slug
-        )
-    })
 }
 
 /// A curve that was measured across the polarisation that was sent says nothing of what a scene takes it for.

@@ -12,7 +12,6 @@ use crate::material::Material;
 
 pub use doubts::doubts;
 pub(super) use missing::{clauses, missing};
-pub(super) use slips::strange_frequency;
 
 /// Checks that a material of a file may be added.
 ///

@@ -105,7 +105,7 @@ fn of_addresses(material: &Material) -> Vec<Slip> {
 }
 
 /// That a measured curve is of another frequency than the entry claims.
-pub(in crate::adopt) fn strange_frequency(material: &Material, curve: &Curve) -> Option<Slip> {
+fn strange_frequency(material: &Material, curve: &Curve) -> Option<Slip> {
     let key = curve.instrument.as_ref()?;
     let instrument = material.instruments.iter().find(|instrument| instrument.key == *key)?;
     let source = material.sources.iter().find(|source| source.key == curve.source);

@@ -382,6 +382,26 @@ mod tests {
     }
 
     #[test]
+    fn the_growth_of_the_spectra_is_that_of_their_logarithms() {
+        for correlation in [Correlation::Gaussian, Correlation::Exponential] {
+            for across in [0.0, 3.0, 40.0] {
+                for beam in [0.0, 1e-6, 2.0, 300.0] {
+                    for n in [1.0, 2.0, 17.0, 400.0] {
+                        let ln = |n| correlation.spectrum_ln(n, across, beam);
+                        let (found, expected) =
+                            (correlation.growth(n, across, beam), (ln(n + 1.0) - ln(n)).exp());
+                        let error = (found / expected - 1.0).abs();
+                        assert!(error < 1e-6, "{correlation:?} {across} {beam} {n}: {error}");
+                        let over = correlation.spectrum_over(ln(n), across, beam);
+                        let error = (over(n + 1.0) / expected - 1.0).abs();
+                        assert!(error < 1e-6, "{correlation:?} {across} {beam} {n}: {error}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
     fn factorials_are_exact() {
         let mut expected = 0.0;
         for n in 1..200 {

@@ -31,14 +31,18 @@ pub(super) fn write(subject: &Subject, name: &str) -> Export {
     text += &format!("# {}, at {} GHz\n", describe(&points), points.frequency_hz / 1e9);
     let lit = points.curve.map(|curve| curve.illumination).unwrap_or_default();
     let [names, lit] = lit.columns();
+    let observations = match points.curve {
+        Some(curve) => curve.stated().collect(),
+        None => points.observations.to_vec(),
+    };
     let stated: Vec<&Detailed> = DETAILS
         .iter()
-        .filter(|detail| points.observations.iter().any(|point| (detail.of)(point).is_some()))
+        .filter(|detail| observations.iter().any(|point| (detail.of)(point).is_some()))
         .collect();
     text += "theta_deg,sigma0_db,censor,threshold_db,theta_r_deg,delta_phi_deg";
     stated.iter().for_each(|detail| text += &format!(",{}", detail.column));
     text += &format!("{names}\n");
-    for point in points.observations.iter() {
+    for point in &observations {
         let details = stated.iter().map(|detail| (detail.of)(point).map(fifteen_digits));
         let details: String =
             details.map(|cell| format!(",{}", cell.unwrap_or_default())).collect();
@@ -104,7 +108,8 @@ pub(super) fn read(
     let points =
         file::points(bytes, &given.columns).map_err(|error| ExchangeError::in_file(file, error))?;
     let illumination = points.illumination;
-    let notices = points.passed_over.into_iter().chain(points.notices).collect();
+    let unused = points.unused_deviations();
+    let notices = unused.into_iter().chain(points.passed_over).chain(points.notices).collect();
     let observations: Vec<Observation> = points.rows.into_iter().map(|(_, point)| point).collect();
     if observations.is_empty() {
         let empty =
@@ -225,7 +230,8 @@ pub(super) fn of_curve(file: &str, given: &Details, single: SingleCurve) -> Mate
     let SingleCurve { illumination, observations, .. } = single;
     let stem = Path::new(file_name(file)).file_stem().unwrap_or_default().to_string_lossy();
     let name = given.curve.clone().unwrap_or(stem.into_owned());
-    let angles_rad = observations.iter().map(|point| point.theta_i_rad);
+    // Two directions show what the surface returns where its facets are tilted to the middle of them.
+    let angles_rad = observations.iter().map(|point| point.aspect().half_angle_rad());
     let (least_rad, greatest_rad) =
         (angles_rad.clone().fold(f64::INFINITY, f64::min), angles_rad.fold(0.0, f64::max));
     Material {

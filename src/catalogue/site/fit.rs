@@ -170,7 +170,7 @@ fn in_words(
     stored_sd: Option<f64>,
 ) -> (String, bool) {
     let product = PRODUCTS.iter().find(|(known, _)| *known == path);
-    let product = product.filter(|_| fit.model.identified_products().is_some());
+    let product = product.filter(|_| fit.identified_products().is_some());
     let convention = |name: &str| format!("only inside {name}; this value is a convention");
     match (told, product) {
         (Some(told), _) if told.is_identified() => ("yes".to_owned(), true),
@@ -195,7 +195,7 @@ fn in_words(
 }
 
 fn products(fit: &Fit) -> Vec<ProductView> {
-    let Some([specular, diffuse]) = fit.model.identified_products() else { return Vec::new() };
+    let Some([specular, diffuse]) = fit.identified_products() else { return Vec::new() };
     vec![product(fit, "S", "(1 − k) · f_lambda", specular), product(fit, "R", "k · r_s", diffuse)]
 }
 
@@ -221,7 +221,7 @@ fn held_out(held: &CrossValidation) -> String {
 
 /// How far the form of the law is off, which no band holds.
 fn form_error(report: &FitReport) -> String {
-    match report.form_error_db() {
+    match report.goodness.form_error_db() {
         Some(0.0) => "no more than the noise hides".to_owned(),
         Some(db) => format!("{db:.2} dB rms beyond the noise; the band does not hold it"),
         None => "not known: no noise is stated".to_owned(),
@@ -232,7 +232,7 @@ fn report(report: &FitReport) -> ReportView {
     let g = &report.goodness;
     let end = if report.converged { "converged" } else { "did not converge" };
     let speckle =
-        g.speckle_db.map_or(String::new(), |db| format!("; speckle alone leaves {db:.2} dB"));
+        g.speckle_db.map_or(String::new(), |db| format!("; speckle alone scatters by {db:.2} dB"));
     let noise = if report.noise_w > 0.0 {
         format!("{} dBm", digits(dbm_from_watts(report.noise_w)))
     } else {

@@ -183,6 +183,12 @@ fn unknown(material: &Material) -> Vec<String> {
     if !has_measured_curve(material) {
         found.push("This entry holds no measured curve.".to_owned());
     }
+    for curve in material.curves.iter().filter(|curve| curve.illumination.relative) {
+        found.push(format!(
+            "The levels of curve {} are relative: the factor is not known.",
+            curve.name
+        ));
+    }
     if material.fits.iter().all(|fit| fit.covariance.is_none()) {
         found.push("No number here carries an uncertainty.".to_owned());
     }

@@ -108,9 +108,10 @@ fn level(report: &FitReport) -> String {
 fn goodness(report: &FitReport) -> String {
     let Goodness { rms_db, mean_db, speckle_db, z_mean, z_variance, ks_distance, .. } =
         report.goodness;
-    let speckle = speckle_db
-        .map_or(String::new(), |speckle_db| format!(" (speckle alone leaves {speckle_db:.2} dB)"));
-    let form = report.form_error_db().filter(|db| *db > 0.0).map_or(String::new(), |db| {
+    let speckle = speckle_db.map_or(String::new(), |speckle_db| {
+        format!(" (speckle alone scatters by {speckle_db:.2} dB)")
+    });
+    let form = report.goodness.form_error_db().filter(|db| *db > 0.0).map_or(String::new(), |db| {
         format!("the form of the law is off by {db:.2} dB rms, which is not in the deviations\n")
     });
     format!(

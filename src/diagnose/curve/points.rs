@@ -107,6 +107,9 @@ impl Points {
     /// `sd_db` is what the file states of the deviation of each level.
     pub fn backscatter(curve: &Curve, sd_db: &[Option<f64>], noise_db: Option<f64>) -> Points {
         const GRAZING_RAD: f64 = 1.569;
+        let of_levels = curve.observations.iter().zip(sd_db);
+        let of_levels = of_levels.filter(|(row, _)| !row.is_censored());
+        let sd_db: Vec<Option<f64>> = of_levels.map(|(_, sd_db)| *sd_db).collect();
         let mut points: Vec<Point> = curve
             .observations
             .iter()
@@ -133,9 +136,9 @@ impl Points {
         // Angles of single chirps coincide by chance.
         let are_repeats = points.len() >= 2 * groups.len();
         if !are_repeats || points.iter().any(|point| point.censored) {
-            return Points::new(Kind::Backscatter, points, noise_db, stated(sd_db));
+            return Points::new(Kind::Backscatter, points, noise_db, stated(&sd_db));
         }
-        Points::of_groups(Kind::Backscatter, groups, noise_db, stated(sd_db))
+        Points::of_groups(Kind::Backscatter, groups, noise_db, stated(&sd_db))
     }
 
     /// The points of values in the plane of incidence; repeats become their mean level.

@@ -3,8 +3,8 @@
 //! As CSV: `theta_i_deg,theta_s_deg,brdf_per_sr`, and `sd_db` where it is known. θ_s is positive on the
 //! side of the mirror direction, so that θ_s = θ_i is the mirror and θ_s = −θ_i the way back. A pair of
 //! angles may occur several times, as repeated measurements. Values that the instrument could
-//! not measure, such as those behind its own detector, are left out, and so is a value that is not above its blank,
-//! `blank_per_sr`.
+//! not measure, such as those behind its own detector, are left out; one that is not above its blank, `blank_per_sr`, is a
+//! limit.
 //!
 //! Also read are the isotropic tables of optical design programs (`.bsdf`), whose angles are counted from
 //! the mirror direction: azimuth 0 leads towards the normal and past it, 180° away from it.
@@ -65,16 +65,15 @@ pub fn is_bsdf(bytes: &[u8]) -> bool {
     first_words.any(|first| words.iter().any(|word| word.as_bytes() == first))
 }
 
-/// A row of a table.
+/// A row of a table, without the deviation of its level.
 pub(super) fn read_row(table: &Table, row: usize) -> Result<InPlane, FormatError> {
-    let sd_db = table.number_within(row, "sd_db", (1e-6, 100.0))?;
     let theta_i_deg = table.required_within(row, "theta_i_deg", (0.0, GRAZING_DEG))?;
     let theta_s_deg = table.required_within(row, "theta_s_deg", (-GRAZING_DEG, GRAZING_DEG))?;
     Ok(InPlane {
         theta_i_rad: theta_i_deg.to_radians(),
         theta_s_rad: theta_s_deg.to_radians(),
         f_per_sr: table.required_within(row, "brdf_per_sr", VALUES_PER_SR)?,
-        sd_db,
+        sd_db: None,
     })
 }
 
@@ -127,13 +126,11 @@ pub fn read_bsdf(bytes: &[u8]) -> Result<(Vec<InPlane>, Vec<String>), FormatErro
         return Err(FormatError::at("the file", problem, way_out));
     }
     let mut notices = Vec::new();
-    let mut behind = lines.filter(|(_, line)| !line.starts_with("DataEnd"));
-    match (header.rotations_deg.as_slice(), behind.next()) {
+    let behind = lines.next().filter(|(_, line)| !line.starts_with("DataEnd"));
+    match (header.rotations_deg.as_slice(), behind) {
         ([first, _, ..], _) => {
-            notices.push(format!(
-                "of {} rotations of the sample that at {first}° is read",
-                header.rotations_deg.len()
-            ));
+            let all = header.rotations_deg.len();
+            notices.push(format!("only the rotation at {first}° is read; the file has {all}"));
         }
         (_, Some((number, _))) => {
             let problem = "something stands behind the last block";
@@ -144,7 +141,8 @@ pub fn read_bsdf(bytes: &[u8]) -> Result<(Vec<InPlane>, Vec<String>), FormatErro
     }
     if negative > 0 {
         let values = counted(negative, "value");
-        notices.push(format!("{values} below zero, which no surface has, are left out"));
+        let are = if negative == 1 { "is" } else { "are" };
+        notices.push(format!("{values} below zero {are} left out: no surface has one"));
     }
     Ok((found, notices))
 }
@@ -285,21 +283,28 @@ mod tests {
         assert!(message(&BSDF.replace("4 5 6", "4 5")).contains("line 14: 2 values for 3 angles"));
         assert!(message(&BSDF.replace("0 20 80", "0 x 80")).contains("line 8"));
         assert!(message(&BSDF.replace("Radial 3", "Radial 4")).contains("3 angles"));
-        for (word, said) in [("BTDF", "table of transmission"), ("XYZ", "three colours")] {
+        for (word, said) in [
+            ("BTDF", "table of transmission"),
+            ("ScatterType BTDF", "table of transmission"),
+            ("XYZ", "three colours"),
+        ] {
             assert!(message(&BSDF.replace("Monochrome", word)).contains(said));
         }
+        assert!(
+            read_bsdf(BSDF.replace("Measured", "Measured on the XYZ stage").as_bytes()).is_ok()
+        );
         let more = format!("{BSDF}TIS 0.1\n1 2 0\n");
         assert!(message(&more).contains("line 20: something stands behind the last block"));
     }
 
     #[test]
     fn what_is_left_out_of_a_bsdf_is_said() {
-        let negative = BSDF.replace("1 2 0\n", "1 2 -3\n") + "DataEnd\n";
+        let negative = BSDF.replace("1 2 0\n", "1 2 -3\n") + "DataEnd\nmeasured in May\n";
         let (found, notices) = read_bsdf(negative.as_bytes()).unwrap();
         assert_eq!(found.len(), 7);
-        assert_eq!(notices, ["1 value below zero, which no surface has, are left out"]);
+        assert_eq!(notices, ["1 value below zero is left out: no surface has one"]);
         let rotated = BSDF.replace("Source", "SampleRotation 2\n0 90\nSource") + "TIS 0.1\n";
         let (_, notices) = read_bsdf(rotated.as_bytes()).unwrap();
-        assert_eq!(notices, ["of 2 rotations of the sample that at 0° is read"]);
+        assert_eq!(notices, ["only the rotation at 0° is read; the file has 2"]);
     }
 }

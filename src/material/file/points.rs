@@ -6,12 +6,12 @@
 //! A level that is not above its blank (`blank_db`, or `blank_per_sr`) counts as a limit at the blank. A `.bsdf` is read as
 //! a table in the plane of incidence.
 
-use std::collections::HashSet;
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
 use super::in_plane::{self, InPlane, VALUES_PER_SR};
 use crate::formats::csv::{Names, Table};
 use crate::formats::{ColumnNames, FormatError};
-use crate::material::Aspect;
 use crate::material::curve::{Censor, Illumination, Observation};
 use crate::radar::Footprint;
 use crate::units::{db_from_ratio, ratio_from_db, watts_from_dbm};
@@ -34,6 +34,9 @@ const NOT_IN_PLANE: [&str; 7] = [
 ];
 /// Columns that only a table in the plane of incidence may have.
 const ONLY_IN_PLANE: [&str; 2] = ["theta_i_deg", "blank_per_sr"];
+/// Those of them that say what was not detected.
+const LIMITS: [&str; 6] =
+    ["censor", "threshold_db", "censored", "only_detected", "blank_db", "blank_per_sr"];
 /// Columns of any table.
 const OPTIONAL: [&str; 12] = [
     "theta_sd_deg",
@@ -60,6 +63,8 @@ const DEVIATIONS_DB: (f64, f64) = (1e-6, 100.0);
 const LEVELS_DB: (f64, f64) = (-300.0, 300.0);
 /// Powers that are no slip, dBm.
 const POWERS_DBM: (f64, f64) = (-400.0, 400.0);
+/// Difference of two limits that is rounding, dB.
+const SAME_DB: f64 = 0.01;
 /// Ranges that are no slip, m.
 const RANGES_M: (f64, f64) = (0.0, 1e6);
 /// Places on a target that are no slip, m.
@@ -83,6 +88,14 @@ pub struct Points {
     pub passed_over: Option<String>,
     /// What else a person should know of the file.
     pub notices: Vec<String>,
+}
+
+impl Points {
+    /// That levels have deviations, for what has no use for them.
+    pub fn unused_deviations(&self) -> Option<String> {
+        let stated = self.sd_db.iter().any(Option::is_some);
+        stated.then(|| "the deviations in `sd_db` are not used here, nor stored".to_owned())
+    }
 }
 
 /// Reads a curve's table, whose columns have these names of ours; others are passed over with a notice. Lines of `#` at
@@ -137,35 +150,63 @@ pub fn points(bytes: &[u8], names: &ColumnNames) -> Result<Points, FormatError> 
         notices
             .push(format!("{below} of {all} levels are not above their blank and count as limits"));
     }
-    notices.extend(copies(&rows));
+    notices.extend(copies(&rows, &sd_db));
     let is_in_plane = matches!(form, Form::InPlane);
     let illumination = illumination(&table)?;
     Ok(Points { rows, sd_db, is_in_plane, illumination, passed_over, notices })
 }
 
-/// The numbers by which two points are told apart.
-fn bits(point: &Observation) -> [Option<u64>; 9] {
-    let Observation { sigma0, threshold_sigma0, range_m, chirp, target_m, .. } = *point;
-    let Aspect { theta_i_rad, theta_r_rad, delta_phi_rad } = point.aspect();
-    let [xt_m, yt_m] = target_m.map_or([None; 2], |place| place.map(Some));
-    let angles = [theta_i_rad, theta_r_rad, delta_phi_rad].map(Some);
-    let [a, b, c] = angles.map(|angle| angle.map(f64::to_bits));
-    let [d, e, f, g, h] =
-        [sigma0, threshold_sigma0, range_m, xt_m, yt_m].map(|x| x.map(f64::to_bits));
-    [a, b, c, d, e, f, g, h, chirp.map(u64::from)]
+/// That the longest run of rows that repeats an earlier one exactly is no chance.
+fn copies(rows: &[(usize, Observation)], sd_db: &[Option<f64>]) -> Option<String> {
+    /// Rows of a copy where the rest is more than that: levels of few digits coincide at repeated angles.
+    const FEWEST: usize = 10;
+    const FEWEST_OF_HALF: usize = 3;
+    let mut seen: HashMap<[Option<u64>; 12], usize> = HashMap::new();
+    // Of the run so far: how far back the rows are that it repeats, its first row, and how many detections it has.
+    let mut run = (0, 0, 0);
+    let mut longest = run;
+    for (place, (_, point)) in rows.iter().enumerate() {
+        match seen.entry(bits(point, sd_db[place])) {
+            Entry::Vacant(new) => {
+                new.insert(place);
+                run = (0, place + 1, 0);
+            }
+            Entry::Occupied(known) => {
+                let back = place - known.get();
+                if back != run.0 {
+                    run = (back, place, 0);
+                }
+                // Limits at repeated angles are all alike.
+                run.2 += usize::from(!point.is_censored());
+                longest = if run.2 > longest.2 { run } else { longest };
+            }
+        }
+    }
+    let (back, first, count) = longest;
+    let detected = rows.iter().filter(|(_, point)| !point.is_censored()).count();
+    let is_half = 2 * count >= detected && count >= FEWEST_OF_HALF;
+    (is_half || (count >= FEWEST && FEWEST * count >= detected)).then(|| {
+        format!(
+            "from line {} on {count} rows may be a copy of those from line {} on: each counts as a measurement of its own, so \
+             leave copies out",
+            rows[first].0,
+            rows[first - back].0
+        )
+    })
 }
 
-/// That many rows say exactly what another one says.
-fn copies(rows: &[(usize, Observation)]) -> Option<String> {
-    /// Levels of few digits coincide at repeated angles.
-    const BY_CHANCE: usize = 10;
-    let different: HashSet<_> = rows.iter().map(|(_, point)| bits(point)).collect();
-    let copies = rows.len() - different.len();
-    (copies * BY_CHANCE > rows.len()).then(|| {
-        format!(
-            "{copies} of {} rows are equal to another row; each counts as a measurement of its own, so leave copies out",
-            rows.len()
-        )
+/// Every number of a point.
+fn bits(point: &Observation, sd_db: Option<f64>) -> [Option<u64>; 12] {
+    let Observation { theta_i_rad, theta_r_rad, delta_phi_rad, sigma0, .. } = *point;
+    let Observation { threshold_sigma0, theta_sd_rad, power_w, range_m, chirp, target_m, .. } =
+        *point;
+    let place = target_m.map_or([None; 2], |place| place.map(Some));
+    let angles = [theta_i_rad, theta_r_rad, delta_phi_rad].map(Some);
+    let others = [sigma0, threshold_sigma0, theta_sd_rad, power_w, range_m, sd_db];
+    let mut numbers = angles.into_iter().chain(others).chain(place);
+    std::array::from_fn(|index| match index {
+        11 => chirp.map(u64::from),
+        _ => numbers.next().flatten().map(f64::to_bits),
     })
 }
 
@@ -191,7 +232,7 @@ impl Form {
 
     /// Refuses columns that a table of the other form has.
     fn refuse_the_other(self, table: &Table) -> Result<(), FormatError> {
-        let (others, own, way_out) = match self {
+        let (others, own, limit) = match self {
             Form::Backscatter { .. } => {
                 (&ONLY_IN_PLANE[..], "backscatter", "its blank in blank_db")
             }
@@ -201,14 +242,13 @@ impl Form {
                 "a limit in blank_per_sr",
             ),
         };
-        match others.iter().find(|column| table.has(column)) {
-            None => Ok(()),
-            Some(column) => Err(FormatError::at(
-                "the header",
-                format!("a table of {own} has no `{column}`"),
-                format!("give {way_out}, or pass the column over by --columns {column}=-"),
-            )),
-        }
+        let Some(column) = others.iter().find(|column| table.has(column)) else { return Ok(()) };
+        let pass_over = format!("pass the column over by --columns {column}=-");
+        let is_of_limits = LIMITS.contains(column);
+        let way_out =
+            if is_of_limits { format!("give {limit}, or {pass_over}") } else { pass_over };
+        let problem = format!("a table of {own} has no `{column}`");
+        Err(FormatError::at("the header", problem, way_out))
     }
 
     fn point(self, table: &Table, row: usize) -> Result<Observation, FormatError> {
@@ -358,6 +398,13 @@ fn point(
     let level_db = level_db(table, row, level)?;
     let limit_db = number("threshold_db", LEVELS_DB)?;
     let is_flagged = censor == Censor::Left && table.cell(row, "censored").is_some();
+    if let (true, Some(level_db), Some(limit_db)) = (is_flagged, level_db, limit_db)
+        && (level_db - limit_db).abs() > SAME_DB
+    {
+        let place = format!("line {}, column threshold_db", table.line(row));
+        let problem = format!("`{level}` is another limit, since `censored` is 1");
+        return Err(FormatError::at(place, problem, "give one of them"));
+    }
     let (level_db, limit_db) = match (censor, level_db, limit_db) {
         (Censor::Left, level, limit) if is_flagged => (None, limit.or(level)),
         (_, level, limit) => (level, limit),
@@ -492,9 +539,22 @@ mod tests {
 
     #[test]
     fn copied_rows_are_said() {
-        let copied = "theta_deg,sigma0_db\n10,-3\n20,-4\n30,-5\n10,-3\n20,-4\n30,-5.1\n";
-        let notices = points(copied.as_bytes(), &ours()).unwrap().notices;
-        assert!(notices[0].starts_with("2 of 6 rows are equal to another row"), "{notices:?}");
+        let notices = |text: &str| points(text.as_bytes(), &ours()).unwrap().notices;
+        let rows = "10,-3\n20,-4\n30,-5\n";
+        let copied = notices(&format!("theta_deg,sigma0_db\n{rows}40,-6\n{rows}"));
+        assert!(
+            copied[0].starts_with("from line 6 on 3 rows may be a copy of those from line 2 on"),
+            "{copied:?}"
+        );
+        // Two of seven levels coincide, and limits always do.
+        assert!(
+            notices(&format!("theta_deg,sigma0_db\n{rows}40,-6\n10,-3\n20,-4\n30,-5.1\n"))
+                .is_empty()
+        );
+        let limits = "50,,left,-40\n60,,left,-40\n70,,left,-40\n80,,left,-40\n";
+        let swept = |level| format!("10,{level},,\n20,-4,,\n{limits}");
+        let two = format!("theta_deg,sigma0_db,censor,threshold_db\n{}{}", swept(-3), swept(-2));
+        assert!(notices(&two).is_empty(), "{:?}", notices(&two));
     }
 
     #[test]
@@ -633,6 +693,10 @@ mod tests {
             (
                 "theta_deg,sigma0_db,blank_per_sr\n1,2,3\n",
                 "a table of backscatter has no `blank_per_sr`; give its blank in blank_db",
+            ),
+            (
+                "theta_deg,sigma0_db,theta_i_deg\n1,2,3\n",
+                "has no `theta_i_deg`; pass the column over by --columns theta_i_deg=-",
             ),
             ("theta_deg,sigma0_db,delta_phi_deg\n1,2,1e300\n", "give a value from -360 to 360"),
             ("theta_deg,sigma0_db,only_detected\n1,2,yes\n", "column only_detected: `yes`"),

@@ -5,10 +5,9 @@ use std::path::Path;
 use crate::brdf::Brdf;
 use crate::diagnose::curve::{CurveDiagnosis, CurveReport, Points, Term, base_law};
 use crate::error::Error;
-use crate::formats::words::counted;
 use crate::formats::{ColumnNames, FormatError};
 use crate::material::Observation;
-use crate::material::file::in_plane::InPlane;
+use crate::material::file::in_plane::{InPlane, is_bsdf, read_bsdf};
 use crate::material::file::points;
 use crate::measure::Curve;
 
@@ -52,16 +51,30 @@ impl CurveRequest<'_> {
     }
 
     fn read(&self, bytes: &[u8]) -> Result<(Points, Vec<String>), FormatError> {
+        let is_named_so = self.path.extension().is_some_and(|end| end.eq_ignore_ascii_case("bsdf"));
+        if is_named_so && !is_bsdf(bytes) {
+            // What it lacks.
+            read_bsdf(bytes)?;
+        }
         let table = points(bytes, self.columns)?;
         let (sd_db, is_in_plane) = (table.sd_db.clone(), table.is_in_plane);
         let (curve, mut notices) = Curve::of_points(table)?;
+        let stated = curve.observations.iter().zip(&sd_db).filter(|(row, _)| !row.is_censored());
+        let stated: Vec<bool> = stated.map(|(_, sd_db)| sd_db.is_some()).collect();
+        if stated.contains(&true) && stated.contains(&false) {
+            notices.push("`sd_db` is not used: some levels have none".to_owned());
+        }
+        if curve.illumination.relative {
+            let problem = "the levels are relative, and a law has levels of its own";
+            let way_out =
+                "calibrate them, or `matdb fit` the curve: its widths and exponents need no level";
+            return Err(FormatError::at("column relative", problem, way_out));
+        }
         if !is_in_plane && curve.observations.iter().all(Observation::is_retro) {
             return Ok((Points::backscatter(&curve, &sd_db, self.noise_db), notices));
         }
-        let censored = curve.observations.iter().filter(|row| row.is_censored()).count();
-        if censored > 0 {
-            let all = counted(curve.observations.len(), "level");
-            notices.push(format!("{censored} of {all} are limits, and are left out"));
+        if curve.observations.iter().any(Observation::is_censored) {
+            notices.push("limits are left out in the plane of incidence".to_owned());
         }
         Ok((Points::in_plane(&values(&curve, &sd_db)?, self.noise_db), notices))
     }
