@@ -90,8 +90,8 @@ fn stopped_level(result: &FitResult, found: &SearchResult) -> Option<(String, bo
     first
 }
 
-/// Detections at larger angles than this, 89.9°, no law explains.
-const GRAZING_RAD: f64 = 1.569;
+/// Detections at larger angles than this, 89.994°, no law explains.
+const GRAZING_RAD: f64 = 1.5707;
 
 fn check_rows(rows: &[Observation]) -> Result<(), FitError> {
     if rows.is_empty() {

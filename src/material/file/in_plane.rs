@@ -176,8 +176,11 @@ impl Header {
         loop {
             let Some((number, line)) = lines.next() else { return Err(missing("DataBegin")) };
             let words: Vec<&str> = line.split_whitespace().collect();
-            if let Some((_, problem)) = OTHER_TABLES.iter().find(|(other, _)| words.contains(other))
-            {
+            let kind = match words[..] {
+                [kind] | ["ScatterType" | "SpectralContent", kind] => kind,
+                _ => "",
+            };
+            if let Some((_, problem)) = OTHER_TABLES.iter().find(|(other, _)| *other == kind) {
                 let way_out = "give the BRDF at one wavelength";
                 return Err(FormatError::at(format!("line {number}"), *problem, way_out));
             }
