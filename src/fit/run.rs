@@ -90,8 +90,8 @@ fn stopped_level(result: &FitResult, found: &SearchResult) -> Option<(String, bo
     first
 }
 
-/// Detections at larger angles than this, 89.994°, no law explains.
-const GRAZING_RAD: f64 = 1.5707;
+/// Detections at larger angles than this, rad, no law explains: a ten-thousandth below a right angle.
+const GRAZING_RAD: f64 = std::f64::consts::FRAC_PI_2 - 1e-4;
 
 fn check_rows(rows: &[Observation]) -> Result<(), FitError> {
     if rows.is_empty() {
