@@ -331,7 +331,7 @@ fn points_that_are_there_already_are_not_stored_twice() {
     };
     let slow: Vec<&str> = said.iter().copied().map(slow).collect();
     let refusal = refused(matdb(folder).args(fit).args(&slow).args(["--curve", "third"]));
-    assert!(refusal.contains("was measured at 77 GHz and the entry claims 300 GHz"), "{refusal}");
+    assert!(refusal.contains("was measured at 77 GHz and `my-paint` claims 300 GHz"), "{refusal}");
 }
 
 #[test]

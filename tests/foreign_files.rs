@@ -323,7 +323,7 @@ fn a_foreign_curve_is_fitted_compared_and_stored() {
     let error = refused(at, "diagnose --curve aside.csv --noise-db 0.1 -o aside");
     assert!(error.contains("point 41 (from 1): it is out of the plane of incidence"), "{error}");
     // Levels of an unknown unit have a shape alone.
-    let relative = "theta_deg,sigma0_db,relative\n5,20,1\n10,19,1\n20,15,1\n30,9,1\n";
+    let relative = "theta_deg,sigma0_db,relative\n0,20,1\n20,15,1\n40,5,1\n68,-20,1\n";
     fs::write(at.join("relative.csv"), relative).unwrap();
     let error = refused(at, "near --curve relative.csv --measured-at 300");
     assert!(error.contains("rank by shape (--shape)"), "{error}");

@@ -50,6 +50,11 @@ def ask(matdb, truth, path):
     return {**out, "verdict": said["verdict"], "effects": [[e["name"], *e.get("class", [])] for e in said["effects"]]}
 
 
+def ask_until(deadline, matdb, truth, path):
+    """The answer, or None where the time is over."""
+    return ask(matdb, truth, path) if time.time() < deadline else None
+
+
 def hashed(*parts):
     return hashlib.sha256(b"\0".join(parts)).hexdigest()[:16]
 
@@ -59,7 +64,24 @@ def content(path):
         return file.read()
 
 
-def answers(matdb, folder, truths, jobs):
+def recorded(path):
+    """Answers of an earlier run by the names of the curves, from a line each: name, verdict, effects with those of their
+    class behind a +. The first line says of which program and seed they are."""
+    if not path or not os.path.exists(path):
+        return {}
+    with open(path) as file:
+        lines = [line.split() for line in file if not line.startswith("#")]
+    return {name: {"verdict": verdict, "effects": [e.split("+") for e in effects], "seconds": 0.0, "error": "recorded"}
+            for name, verdict, *effects in lines}
+
+
+def record(path, about, answered):
+    lines = [" ".join([name, a["verdict"], *("+".join(e) for e in a["effects"])]) for name, a in sorted(answered.items())]
+    with open(path, "w") as file:
+        file.write(f"# {about}\n" + "".join(line + "\n" for line in lines))
+
+
+def answers(matdb, folder, truths, jobs, earlier, deadline):
     """(truth, answer) of every curve. Answers are stored under program and curve; a stopped run goes on where it was."""
     program = hashed(content(shutil.which(matdb) or matdb))
     store, known = f"{folder}/answers-{program}.jsonl", {}
@@ -68,17 +90,22 @@ def answers(matdb, folder, truths, jobs):
             known = {a["key"]: a for a in map(json.loads, file)}
     paths = [f"{folder}/{t['id']}.csv" for t in truths]
     keys = [hashed(content(p), " ".join(command("", t, "", "")).encode()) for t, p in zip(truths, paths)]
+    for t, k in zip(truths, keys):
+        if t["id"] in earlier:
+            known.setdefault(k, {"key": k, **earlier[t["id"]]})
     pool = concurrent.futures.ThreadPoolExecutor(jobs)
     try:
-        asked = {pool.submit(ask, matdb, t, p): k for t, p, k in zip(truths, paths, keys) if k not in known}
+        asked = {pool.submit(ask_until, deadline, matdb, t, p): k for t, p, k in zip(truths, paths, keys) if k not in known}
         with open(store, "a") as file:
             for future in concurrent.futures.as_completed(asked):
+                if future.result() is None:
+                    continue
                 known[asked[future]] = {"key": asked[future], **future.result()}
                 file.write(json.dumps(known[asked[future]]) + "\n")
                 file.flush()
     finally:
         pool.shutdown(cancel_futures=True)
-    return [(t, known[k]) for t, k in zip(truths, keys)]
+    return [(t, known[k]) for t, k in zip(truths, keys) if k in known]
 
 
 def table(head, rows):
@@ -183,12 +210,22 @@ def main():
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--parts", default="ABC")
     parser.add_argument("--count", type=int, default=10**9, help="the first curves of part A, and of part B")
+    parser.add_argument("--record", help="a file of answers by this program: read first, and written at the end")
+    parser.add_argument("--about", default="", help="first line of the record: the program's commit and the seed")
+    parser.add_argument("--minutes", type=float, default=1e6, help="ask nothing after this time")
     parser.add_argument("--strict", action="store_true", help="exit with 1 unless every target is met")
     a = parser.parse_args()
     with open(f"{a.folder}/truth.jsonl") as file:
         truths = [t for t in map(json.loads, file) if t["id"][0] in a.parts]
     truths = [t for t in truths if t["id"][0] == "C" or int(t["id"][2:]) < a.count]
-    pairs = answers(a.matdb, a.folder, [t for t in truths if t.get("reached", True)], a.jobs)
+    # Curves without a name that is due come last.
+    truths.sort(key=lambda t: (t["id"][0] != "A", t.get("others_leave", DUE + 1) <= DUE))
+    asked = [t for t in truths if t.get("reached", True)]
+    pairs = answers(a.matdb, a.folder, asked, a.jobs, recorded(a.record), time.time() + 60 * a.minutes)
+    if a.record:
+        record(a.record, a.about, {t["id"]: b for t, b in pairs})
+    if len(pairs) < len(asked):
+        print(f"Not all done: {share(len(pairs), len(asked))}.")
     met = bool(a.parts)
     for part, judge in zip("ABC", (complete, missing, stand_ins)):
         if part in a.parts:
@@ -199,7 +236,7 @@ def main():
     print(f"\nLeft out, as the effect cannot get that large: {small}. No answer: {len(errors)}.", *errors, sep="\n")
     seconds = [b["seconds"] for _, b in pairs]
     print(f"Seconds a curve: median {statistics.median(seconds or [0]):.2f}, longest {max(seconds, default=0):.1f}.")
-    if a.strict and (errors or not met):
+    if a.strict and (errors or not met or len(pairs) < len(asked)):
         sys.exit(1)
 
 
