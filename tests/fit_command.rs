@@ -224,7 +224,7 @@ fn bad_input_is_refused_with_a_sentence_and_nothing_is_stored() {
         ("empty.csv", "no rows"),
         ("bad.csv", "line 3"),
         ("absent.csv", "cannot read absent.csv"),
-        ("few.csv --model lambert --noise-dbm -90", "no powers"),
+        ("few.csv --model lambert --noise-dbm -90", "3 of 3 rows of few.csv have no power"),
         ("ptfe", "`ptfe` has no curve that could be fitted"),
         ("cotton --curve other", "`cotton` has no curve `other`; there are:"),
         ("coton", "did you mean `cotton`?"),
