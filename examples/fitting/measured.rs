@@ -92,8 +92,8 @@ fn row(set: &Measured) -> Result<String, Failure> {
     for found in fits {
         let found = found?;
         text += &format!(" {:.2}", found.rms_db);
-        if found.agreeing_starts < bistatic.followed {
-            text += &format!(" ({} of {})", found.agreeing_starts, bistatic.followed);
+        if found.agreeing_starts < bistatic.starts {
+            text += &format!(" ({} of {})", found.agreeing_starts, bistatic.starts);
         }
         text += if found.converged { " |" } else { " (not converged) |" };
     }

@@ -64,13 +64,16 @@ def content(path):
         return file.read()
 
 
-def recorded(path):
+def recorded(path, about):
     """Answers of an earlier run by the names of the curves, from a line each: name, verdict, effects with those of their
     class behind a +. The first line says of which program and seed they are."""
     if not path or not os.path.exists(path):
         return {}
     with open(path) as file:
-        lines = [line.split() for line in file if not line.startswith("#")]
+        first, *lines = file
+    if first != f"# {about}\n":
+        raise SystemExit(f"{path} is of another trial: {first.strip()}; this is # {about}")
+    lines = [line.split() for line in lines]
     return {name: {"verdict": verdict, "effects": [e.split("+") for e in effects], "seconds": 0.0, "error": "recorded"}
             for name, verdict, *effects in lines}
 
@@ -221,7 +224,7 @@ def main():
     # Curves without a name that is due come last.
     truths.sort(key=lambda t: (t["id"][0] != "A", t.get("others_leave", DUE + 1) <= DUE))
     asked = [t for t in truths if t.get("reached", True)]
-    pairs = answers(a.matdb, a.folder, asked, a.jobs, recorded(a.record), time.time() + 60 * a.minutes)
+    pairs = answers(a.matdb, a.folder, asked, a.jobs, recorded(a.record, a.about), time.time() + 60 * a.minutes)
     if a.record:
         record(a.record, a.about, {t["id"]: b for t, b in pairs})
     if len(pairs) < len(asked):

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::by_parts::ByParts;
 use super::coordinates::{Coordinates, frequencies};
 use super::error::FitError;
-use super::minimise::{Local, Minimise, Minimum, Stop, step_each};
+use super::minimise::{Local, Minimise, Stop, step_each};
 use super::search::drawn_start;
 use crate::brdf::{Brdf, Scattering};
 use crate::frames::{Direction, Surface};
@@ -32,15 +32,13 @@ pub struct Sample {
 pub struct Bistatic {
     /// Points that the search starts from, 1 to 1000: the given model first, then drawn around it.
     pub starts: usize,
-    /// Starts that are followed to their end, 1 to `starts`: those that lead furthest in twenty steps.
-    pub followed: usize,
     /// Seed of the drawn starts.
     pub seed: u64,
 }
 
 impl Default for Bistatic {
     fn default() -> Self {
-        Bistatic { starts: 8, followed: 3, seed: 0 }
+        Bistatic { starts: 8, seed: 0 }
     }
 }
 
@@ -55,19 +53,15 @@ pub struct BistaticResult {
     pub converged: bool,
     /// Why it ended.
     pub stop: Stop,
-    /// Of the starts that were followed, those that came within 1 % of the best rms.
+    /// Starts that came within 1 % of the best rms.
     pub agreeing_starts: usize,
 }
 
 /// Level of a model that scatters nothing, dB.
 const NOTHING_DB: f64 = -200.0;
 const SEARCH: Minimise = Minimise { iterations: 300, tolerance: 1e-6, patience: usize::MAX };
-/// The first steps from every start.
-const BRIEF: Minimise = Minimise { iterations: 20, ..SEARCH };
 /// Step of the derivatives in the search.
 const STEP: f64 = 1e-6;
-/// Rms over the best up to which a start counts as one that agrees.
-const ALIKE: f64 = 1.01;
 
 impl Bistatic {
     /// Fits a model, starting at it as given.
@@ -78,39 +72,30 @@ impl Bistatic {
         let coordinates = Coordinates::of_pairs(start, &frequencies(start), &[], Some(1.0))?;
         self.validate(samples, coordinates.len())?;
         let bounds = [coordinates.lower(), coordinates.upper()];
-        let search = |search: Minimise, start: &DVector<f64>| {
-            search.run_with(
-                start,
+        // The rms of every start with where it ended, the given start first.
+        let mut found = Vec::new();
+        for number in 0..self.starts {
+            let start = match number {
+                0 => coordinates.start(),
+                _ => drawn_start(&coordinates, self.seed, number),
+            };
+            let end = SEARCH.run_with(
+                &start,
                 [&bounds[0], &bounds[1]],
                 |at| half_squares(&levels_db(&coordinates.model(at), samples), samples),
                 |at| local(&coordinates, samples, at),
-            )
-        };
-        let mut ends: Vec<Minimum> = (0..self.starts)
-            .map(|number| match number {
-                0 => coordinates.start(),
-                _ => drawn_start(&coordinates, self.seed, number),
-            })
-            .map(|start| search(BRIEF, &start))
-            .collect();
-        ends.sort_by(|a, b| a.local.value.total_cmp(&b.local.value));
-        for end in ends.iter_mut().take(self.followed).filter(|end| end.stop == Stop::Iterations) {
-            *end = search(SEARCH, &end.at);
+            );
+            found.push(((2.0 * end.local.value / samples.len() as f64).sqrt(), end));
         }
-        let Some(best) = ends.iter().min_by(|a, b| a.local.value.total_cmp(&b.local.value)) else {
+        let Some((rms_db, best)) = found.iter().min_by(|(a, _), (b, _)| a.total_cmp(b)) else {
             return Err(FitError::Empty);
         };
-        let alike = best.local.value * ALIKE.powi(2);
         Ok(BistaticResult {
             model: coordinates.model(&best.at),
-            rms_db: (2.0 * best.local.value / samples.len() as f64).sqrt(),
+            rms_db: *rms_db,
             converged: best.converged(),
             stop: best.stop,
-            agreeing_starts: ends
-                .iter()
-                .take(self.followed)
-                .filter(|end| end.local.value <= alike)
-                .count(),
+            agreeing_starts: found.iter().filter(|(rms, _)| *rms <= 1.01 * rms_db).count(),
         })
     }
 
@@ -118,10 +103,6 @@ impl Bistatic {
         if !(1..=1000).contains(&self.starts) {
             let value = self.starts as f64;
             return Err(FitError::Setting { name: "starts", value, min: 1.0, max: 1000.0 });
-        }
-        if !(1..=self.starts).contains(&self.followed) {
-            let (value, max) = (self.followed as f64, self.starts as f64);
-            return Err(FitError::Setting { name: "followed", value, min: 1.0, max });
         }
         if samples.is_empty() {
             return Err(FitError::Empty);
@@ -230,9 +211,5 @@ mod tests {
         assert!(message.contains("row 4") && message.contains("f_per_sr"), "{message}");
         let none = Bistatic { starts: 0, ..Bistatic::default() };
         assert!(none.run(&truth, &samples).unwrap_err().to_string().contains("fit.starts"));
-        for followed in [0, 9] {
-            let wrong = Bistatic { followed, ..Bistatic::default() };
-            assert!(wrong.run(&truth, &samples).unwrap_err().to_string().contains("fit.followed"));
-        }
     }
 }
