@@ -7,6 +7,7 @@ use crate::support::{entries, matdb, refused};
 use matdb::brdf::Scattering;
 use matdb::diagnose::curve::{Points, base_law, term};
 use matdb::material::file::in_plane::InPlane;
+use matdb::measure::Curve;
 use serde_json::Value;
 
 const FILES: [&str; 5] = ["curve.png", "curve.svg", "report.html", "report.json", "residuals.csv"];
@@ -24,16 +25,16 @@ fn table(name: &str, numbers: &[f64]) -> String {
     let law = base_law();
     let angles = [20.0f64, 45.0, 65.0];
     let angles = angles.iter().flat_map(|i| (-38..=38).map(move |k| [*i, 2.0 * f64::from(k)]));
-    let values: Vec<InPlane> = angles
-        .map(|[i, s]| InPlane {
-            theta_i_rad: i.to_radians(),
-            theta_s_rad: s.to_radians(),
-            f_per_sr: 1.0,
-            sd_db: None,
-        })
-        .collect();
+    let values = angles.map(|[i, s]| InPlane {
+        theta_i_rad: i.to_radians(),
+        theta_s_rad: s.to_radians(),
+        f_per_sr: 1.0,
+    });
+    let observations = values.map(|value| value.observation()).collect();
+    let curve = Curve { observations, ..Curve::default() };
+    let points = Points::of_curve(&curve, &[], None).unwrap().points;
     let mut text = "theta_i_deg,theta_s_deg,brdf_per_sr\n".to_owned();
-    for (k, point) in Points::in_plane(&values, None).points.iter().enumerate() {
+    for (k, point) in points.iter().enumerate() {
         let f = law.f_per_sr(point.i, point.o);
         let f = term(name).map_or(f, |term| term.scatter(numbers, &law, point, f));
         // About 0.2 dB of scatter that has no period.

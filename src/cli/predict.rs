@@ -6,7 +6,7 @@ use super::console::Console;
 use super::summary::table;
 use crate::error::Error;
 use crate::files::{folder_of, write_all};
-use crate::report::{PredictedLevel, Prediction, angles_deg};
+use crate::report::{PredictedLevel, Prediction, angles_deg, drawn_words};
 use crate::setup::{Database, MaterialRevision, find_material, later_status_warning};
 use crate::units::{range, shown};
 
@@ -22,7 +22,7 @@ pub(super) struct Args {
     /// NAME or NAME@REVISION
     material: String,
     /// FIRST:LAST:STEP or a list, degrees from 0 to below 90
-    #[arg(long, value_name = "ANGLES", value_parser = Angles::parse, allow_negative_numbers = true)]
+    #[arg(long, value_name = "ANGLES", value_parser = Angles::parse, allow_hyphen_values = true)]
     angles: Angles,
     /// Write the levels as CSV, too
     #[arg(long, short, value_name = "FILE")]
@@ -44,7 +44,8 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let MaterialRevision { material, revision } =
         find_material(store.as_ref(), &args.material, "")?;
     let later = later_status_warning(store.as_ref(), &material.slug, revision)?;
-    later.iter().chain(&material.relative_words()).for_each(|notice| console.notice(notice));
+    let notices = [later, material.relative_words(), drawn_words(&material)?];
+    notices.iter().flatten().for_each(|notice| console.notice(notice));
     let prediction = Prediction::new(&material, revision, &args.angles.0)?;
     let mut text = text(&prediction);
     if let Some(path) = &args.output {

@@ -55,5 +55,5 @@ pub use minimise::Stop;
 pub use models::{model, model_names};
 pub use result::{Band, FitResult};
 pub use settings::{Fit, Method};
-pub use stored::stored_band;
+pub use stored::{stored_band, undetermined};
 pub use verdict::Finding;

@@ -121,12 +121,15 @@ fn count(number: usize) -> u32 {
     u32::try_from(number).unwrap_or(u32::MAX)
 }
 
-/// The 95 % band of a stored fit at an angle (rad), as the beam of its curve sees it, by the delta method on ln σ⁰;
-/// `None` for a fit without a report and for one that did not converge. It is the band of a law of this form: how far the
-/// form itself is off is no part of it. The derivatives are difference quotients of the stored model.
-pub fn stored_band(fit: &material::Fit, theta_rad: f64) -> Option<Band> {
+/// The 95 % band of a stored fit at an angle (rad), as a beam of this angular radius (rad; 0: the surface itself) sees it,
+/// by the delta method on ln σ⁰; `None` for a fit without a report, for one that did not converge, and where a number of
+/// the law is undetermined. It is the band of a law of this form: how far the form itself is off is no part of it. The
+/// derivatives are difference quotients of the stored model.
+pub fn stored_band(fit: &material::Fit, beam_rad: f64, theta_rad: f64) -> Option<Band> {
     let report = fit.report.as_ref().filter(|report| report.converged)?;
-    let beam_rad = fit.beam_rad().unwrap_or(0.0);
+    if undetermined(report).next().is_some() {
+        return None;
+    }
     let slopes: Vec<f64> =
         report.estimates.iter().map(|e| slope(&fit.model, e, beam_rad, theta_rad)).collect();
     let terms = report.covariance.iter().zip(&slopes).flat_map(|(row, a)| {
@@ -135,6 +138,12 @@ pub fn stored_band(fit: &material::Fit, theta_rad: f64) -> Option<Band> {
     let factor = (DEVIATE_95 * terms.sum::<f64>().max(0.0).sqrt()).exp();
     let mid = ThroughBeam { law: &fit.model, beam_rad }.sigma0(theta_rad);
     Some(Band { low: mid / factor, mid, high: mid * factor })
+}
+
+/// Names of the numbers of a law that its curve does not determine by themselves. The looks are no part of the level.
+pub fn undetermined(report: &material::FitReport) -> impl Iterator<Item = &str> {
+    let unknown = report.estimates.iter().filter(|one| one.sd.is_none() && one.name != "looks");
+    unknown.map(|one| one.name.as_str())
 }
 
 /// d ln σ⁰ / d estimate; 0 for an estimate that is not a parameter of the model, such as the looks.
@@ -173,9 +182,10 @@ mod tests {
             Fit { starts: 1, ..Fit::default() }.run(&mixture(0.1, 3.0, 0.02, 0.004), &curve);
         let found = found.unwrap();
         let stored = found.stored("fit", "scan", "bench");
+        let beam_rad = stored.beam_rad().unwrap_or(0.0);
         for theta_deg in [0.0f64, 3.0, 8.0, 30.0, 60.0] {
             let fresh = found.band(theta_deg.to_radians());
-            let kept = stored_band(&stored, theta_deg.to_radians()).unwrap();
+            let kept = stored_band(&stored, beam_rad, theta_deg.to_radians()).unwrap();
             let width = |band: Band| (band.high / band.low).ln();
             // Second-order terms of the difference quotients and of the fit's own table.
             assert!(
@@ -208,7 +218,7 @@ mod tests {
         };
         assert!(!is_told("R") && !is_told("diffuse.alpha"), "{:#?}", found.estimates);
         for theta_deg in [0.0f64, 2.0, 4.0, 6.0, 8.0] {
-            let band = stored_band(&stored, theta_deg.to_radians()).unwrap();
+            let band = stored_band(&stored, 0.0, theta_deg.to_radians()).unwrap();
             let truth = twin.model.sigma0(theta_deg.to_radians());
             assert!(band.high / band.low < 1.3, "{theta_deg}: {band:?}");
             assert!((band.low..band.high).contains(&truth), "{theta_deg}: {band:?}, {truth}");

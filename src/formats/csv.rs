@@ -218,6 +218,7 @@ impl Table {
         let value = self.number(row, column)?;
         match self.cell(row, column) {
             Some(cell) if value.is_some_and(|v| !(least..=greatest).contains(&v)) => {
+                let [least, greatest] = [least, greatest].map(bound);
                 Err(cell.refuse(&format!("give a value from {least} to {greatest}")))
             }
             _ => Ok(value),
@@ -414,6 +415,12 @@ fn without_head(bytes: &[u8]) -> Vec<u8> {
         kept.extend_from_slice(if is_head { b"\n" } else { line });
     }
     kept
+}
+
+/// A bound in a sentence, with a power of ten where there are many zeros.
+fn bound(value: f64) -> String {
+    let is_plain = value == 0.0 || (1e-4..1e7).contains(&value.abs());
+    if is_plain { value.to_string() } else { format!("{value:e}") }
 }
 
 #[cfg(test)]

@@ -88,6 +88,12 @@ pub enum CloudError {
         /// The largest power as given.
         largest: f64,
     },
+    /// A column of powers in which nothing stands.
+    #[error("all {points} powers are 0: the file has none; choose another column, or another file")]
+    NoPowers {
+        /// Number of points.
+        points: usize,
+    },
     /// A power that cannot have been received.
     #[error(
         "point {point} has {} dBm, which is not from {} to {}; check the unit of the power",
@@ -142,7 +148,7 @@ pub enum CloudError {
     },
     /// Counts that are no power.
     #[error(
-        "point {point} has {counts} counts, which is no power; leave out what was not detected, or give --power relative \
+        "point {point} has {counts} counts, and powers are above zero; leave out what was not detected, or give --power relative \
          where these are decibels"
     )]
     NoCounts {

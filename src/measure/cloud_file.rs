@@ -45,8 +45,9 @@ impl PowerUnit {
 
     /// The unit of a column whose name says `named`: that powers are relative may be said of any.
     fn of_column(self, named: PowerUnit) -> PowerUnit {
-        match (named, self) {
-            (PowerUnit::Dbm, PowerUnit::RelativeDb) | (PowerUnit::Watt, PowerUnit::Counts) => self,
+        match (named, self.scale()) {
+            (PowerUnit::Dbm, Scale::Relative) => PowerUnit::RelativeDb,
+            (PowerUnit::Watt, Scale::Relative) => PowerUnit::Counts,
             _ => named,
         }
     }
@@ -128,6 +129,7 @@ impl CloudReading {
         let ranges_m = self.ranges_m(&table)?;
         let chirps = table.column("chirp")?;
         let powers = table.full_column(power_column)?.unwrap_or_default();
+        let strongest = powers.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let mut points = Vec::with_capacity(places.len());
         for (row, place) in places.into_iter().enumerate() {
             let chirp = chirps.as_ref().map(|chirps| chirps[row]).filter(|chirp| !chirp.is_nan());
@@ -135,7 +137,7 @@ impl CloudReading {
                 chirp: chirp.map(|chirp| chirp_number(row, chirp)).transpose()?,
                 point: self.global(place),
                 range_m: ranges_m.as_ref().map(|ranges_m| ranges_m[row]).filter(|r| !r.is_nan()),
-                power_w: power_w(row, powers[row], unit)?,
+                power_w: power_w(row, powers[row], unit, strongest)?,
             });
         }
         let mut cloud = Cloud::new(points)?;
@@ -210,22 +212,21 @@ impl CloudReading {
     }
 }
 
-/// The power of a point, W.
-fn power_w(point: usize, value: f64, unit: PowerUnit) -> Result<f64, CloudError> {
+/// The power of a point, W; the strongest of relative ones is as much as 0 dBm.
+fn power_w(point: usize, value: f64, unit: PowerUnit, strongest: f64) -> Result<f64, CloudError> {
+    let dbm = |power_dbm: f64| {
+        let is_possible = POSSIBLE_DBM.contains(&power_dbm);
+        let refused = CloudError::NoSuchPower { point, power_dbm };
+        is_possible.then(|| watts_from_dbm(power_dbm)).ok_or(refused)
+    };
     match unit {
         _ if !value.is_finite() => Err(CloudError::NotFinite { what: "the power", point }),
-        PowerUnit::Dbm | PowerUnit::RelativeDb => {
-            if POSSIBLE_DBM.contains(&value) {
-                Ok(watts_from_dbm(value))
-            } else {
-                Err(CloudError::NoSuchPower { point, power_dbm: value })
-            }
-        }
+        PowerUnit::Dbm => dbm(value),
+        PowerUnit::RelativeDb => dbm(value - strongest),
         PowerUnit::Watt if value <= 0.0 => Err(CloudError::NotPositive { point, power_w: value }),
         PowerUnit::Watt => Ok(value),
         PowerUnit::Counts if value <= 0.0 => Err(CloudError::NoCounts { point, counts: value }),
-        // One count is as much as 0 dB.
-        PowerUnit::Counts => Ok(1e-3 * value),
+        PowerUnit::Counts => Ok(1e-3 * value / strongest),
     }
 }
 
@@ -235,6 +236,9 @@ fn check_unit(levels_dbm: &[f64]) -> Result<(), CloudError> {
     /// it and zero.
     const STRONGEST_W: f64 = 0.01;
     let largest = levels_dbm.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if levels_dbm.iter().all(|level_dbm| *level_dbm == 0.0) {
+        return Err(CloudError::NoPowers { points: levels_dbm.len() });
+    }
     let are_dbm = largest > STRONGEST_W || levels_dbm.iter().any(|level_dbm| *level_dbm < 0.0);
     if are_dbm { Ok(()) } else { Err(CloudError::Watts { points: levels_dbm.len(), largest }) }
 }

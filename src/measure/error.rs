@@ -52,7 +52,7 @@ pub enum RegistrationError {
     /// The clouds do not overlap.
     #[error(
         "{near} of {points} points are within {:.0} mm of the mesh at the rough pose: no overlap; \
-         give a better rough pose, or check frame and unit", 1e3 * reach_m
+         give a better rough pose, or check the mesh's size, unit (scale) and frame", 1e3 * reach_m
     )]
     NoOverlap {
         /// Points with a neighbour.
@@ -89,6 +89,15 @@ pub enum RegistrationError {
 /// Why a reduction fails.
 #[derive(Debug, Error, PartialEq)]
 pub enum ReductionError {
+    /// No point lies on a ray of the scan.
+    #[error(
+        "none of the {points} points lies on a ray of the scan: is the radar's place right, and is this its scan? `matdb new scene \
+         --cloud` writes a scene with the rays of a cloud"
+    )]
+    OffRays {
+        /// Number of points.
+        points: usize,
+    },
     /// The registration has not converged.
     #[error(
         "the registration has not converged, and a curve needs a pose; give a rough pose that is nearer"
@@ -249,11 +258,7 @@ fn reasons(left_out: &Exclusions) -> String {
         (off_surface, "off its surface", "check the mesh and --pose"),
         (other_region, "of other regions", "choose another --region"),
         (near_edge, "near an edge or another region", "give a smaller --edge-margin"),
-        (
-            unsure_of_facet,
-            "on facets that the pose leaves uncertain",
-            "give --keep-pose where it is known",
-        ),
+        (unsure_of_facet, "on facets that the pose leaves uncertain", "leave --exact-mesh out"),
     ];
     let some = all.into_iter().filter(|(count, ..)| *count > 0);
     let words: Vec<String> =
@@ -275,7 +280,9 @@ mod tests {
         let left_out = Exclusions { near_edge: 7, unsure_of_facet: 3, ..Exclusions::default() };
         let words = ReductionError::NoRows(left_out).to_string();
         assert!(words.contains("7 near an edge or another region (give a smaller --edge-margin)"));
-        assert!(words.contains("3 on facets that the pose leaves uncertain (give --keep-pose"));
+        assert!(
+            words.contains("3 on facets that the pose leaves uncertain (leave --exact-mesh out")
+        );
         assert!(!words.contains("beside the target"), "{words}");
     }
 }

@@ -132,7 +132,7 @@ impl Reduction {
             only_detected,
             ..self.reducer(target, radar, registered)
         };
-        assignment.check_shared()?;
+        assignment.check()?;
         let mut left_out = Exclusions::default();
         let mut rows = detected(&reducer, cloud, &point_rays.rays, &assignment, &mut left_out);
         if rows.is_empty() {
@@ -346,6 +346,8 @@ fn silent(
 /// Which chirp each point belongs to, and which chirps have no point.
 struct Assignment<'a> {
     chirp_of_point: Vec<u32>,
+    /// Points on no ray of the scan.
+    unmatched: usize,
     /// Indices in the scan of the chirps without a point.
     silent: &'a [usize],
     /// Whether silent chirps cannot be recognised.
@@ -376,11 +378,15 @@ impl Assignment<'_> {
             ));
         }
         let chirp_of_point = chirp_of_point.collect();
-        Assignment { chirp_of_point, silent, only_detected, notices }
+        Assignment { chirp_of_point, unmatched, silent, only_detected, notices }
     }
 
-    fn check_shared(&self) -> Result<(), ReductionError> {
+    /// Refuses a cloud of which no point lies on a ray, and one whose points share their chirps.
+    fn check(&self) -> Result<(), ReductionError> {
         let points = self.chirp_of_point.len();
+        if self.unmatched == points {
+            return Err(ReductionError::OffRays { points });
+        }
         let chirps: HashSet<u32> = self.chirp_of_point.iter().copied().collect();
         let shared = points - chirps.len();
         if shared * TOLERATED > points {

@@ -220,10 +220,11 @@ fn split_at_reach(material: &Material, series: Series) -> Vec<Series> {
 
 /// The 95 % band of a fit that has a report.
 fn band(fit: &Fit) -> Option<Series> {
+    let beam_rad = fit.beam_rad().unwrap_or(0.0);
     let (mut low, mut high) = (Vec::new(), Vec::new());
     for step in 0..900u32 {
         let theta_deg = f64::from(step) / 10.0;
-        let Some(band) = stored_band(fit, theta_deg.to_radians()) else { continue };
+        let Some(band) = stored_band(fit, beam_rad, theta_deg.to_radians()) else { continue };
         let [low_db, high_db] = [band.low, band.high].map(db_from_ratio);
         // Where nothing comes back there is no band either.
         if high_db >= FAINTEST_DB {

@@ -155,6 +155,10 @@ impl NeighbourSearch {
         });
         report.materials.truncate(limit);
         report.notices.extend(self.one_sided(&report.materials));
+        if self.illumination.only_detected {
+            let notice = "the curve holds only detections: where few chirps passed the threshold, its levels are too high";
+            report.notices.push(notice.to_owned());
+        }
         if probe.has_pairs() {
             let notice = "where source and receiver were in two directions the curve is compared with what scenes render \
                           there: of a material that is known from backscatter alone, that is extrapolated";

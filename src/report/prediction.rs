@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::level_table::{LevelRow, Sigma0Level, level_rows};
 use crate::error::Error;
-use crate::fit::stored_band;
+use crate::fit::{stored_band, undetermined};
 use crate::material::{Fit, Material, Slug};
 use crate::units::{db_from_ratio, rounded};
 
@@ -35,11 +35,11 @@ pub struct Prediction {
 pub struct PredictedLevel {
     /// Angle of incidence, °.
     pub theta_deg: f64,
-    /// σ⁰, dB; none where only a limit is known, or nothing comes back.
+    /// σ⁰ of the surface itself, before a beam smooths it, dB; none where only a limit is known, or nothing comes back.
     pub sigma0_db: Option<f64>,
     /// Limit below which σ⁰ lies, dB, where nothing was detected.
     pub below_db: Option<f64>,
-    /// 95 % band of the fitted mean σ⁰, dB. It holds the uncertainty of the fit, not that of the law's form.
+    /// 95 % band of that level, dB. It holds the uncertainty of the fit, not that of the law's form.
     pub band_db: Option<[f64; 2]>,
     /// How far the angle lies outside those that the material is described for, °; 0 within.
     pub outside_deg: f64,
@@ -82,7 +82,7 @@ impl PredictedLevel {
             Sigma0Level::Nothing => (None, None),
         };
         let band = fit.filter(|_| sigma0_db.is_some());
-        let band = band.and_then(|fit| stored_band(fit, theta_deg.to_radians()));
+        let band = band.and_then(|fit| stored_band(fit, 0.0, theta_deg.to_radians()));
         let band_db = band.map(|band| [band.low, band.high].map(db_from_ratio));
         PredictedLevel { theta_deg, sigma0_db, below_db, band_db, outside_deg }
     }
@@ -94,9 +94,7 @@ fn no_band(fit: Option<&Fit>) -> Option<String> {
     let Some(report) = &fit.report else {
         return Some("the numbers of the law were stated, not fitted".to_owned());
     };
-    // All but the looks act on the level.
-    let unknown = report.estimates.iter().filter(|e| e.sd.is_none() && e.name != "looks");
-    let unknown: Vec<&str> = unknown.map(|estimate| estimate.name.as_str()).collect();
+    let unknown: Vec<&str> = undetermined(report).collect();
     if unknown.is_empty() {
         return None;
     }
@@ -116,17 +114,19 @@ pub fn angles_deg(text: &str) -> Result<Vec<f64>, String> {
             let count = (last - first) / step;
             if !(step > 0.0 && count >= 0.0 && count < MOST_ANGLES as f64) {
                 return Err(format!(
-                    "`{text}` is no range; write FIRST:LAST:STEP, as in 0:80:5, with at most \
+                    "`{text}` names no angles; write FIRST:LAST:STEP, as in 0:80:5, with at most \
                      {MOST_ANGLES} angles"
                 ));
             }
             // The last angle counts although steps round.
             (0..=(count + 1e-9) as usize).map(|k| rounded(first + k as f64 * step)).collect()
         }
-        _ => return Err(format!("`{text}` is no list of angles; write 0:80:5 or 10,20,30")),
+        _ => return Err(format!("`{text}` names no angles; write 0:80:5 or 10,20,30")),
     };
     match angles.iter().find(|angle| !(0.0..90.0).contains(*angle)) {
-        Some(angle) => Err(format!("{angle}° is no angle of incidence; give 0 to below 90")),
+        Some(angle) => Err(format!(
+            "{angle}° is out of the range; give angles of incidence from 0 to below 90"
+        )),
         None => Ok(angles),
     }
 }
@@ -146,15 +146,15 @@ mod tests {
         assert_eq!(angles_deg("10, 5,89.9").unwrap(), [10.0, 5.0, 89.9]);
         for (text, says) in [
             ("", "is not a number"),
-            ("0:80", "is no list of angles"),
-            ("0:80:0", "is no range"),
-            ("0:80:-5", "is no range"),
-            ("80:0:5", "is no range"),
+            ("0:80", "names no angles"),
+            ("0:80:0", "names no angles"),
+            ("0:80:-5", "names no angles"),
+            ("80:0:5", "names no angles"),
             ("0:80:1e-9", "at most 10000 angles"),
-            ("nan:80:5", "is no range"),
-            ("inf", "is no angle of incidence"),
-            ("0:90:5", "90° is no angle"),
-            ("-5", "-5° is no angle"),
+            ("nan:80:5", "names no angles"),
+            ("inf", "inf° is out of the range"),
+            ("0:90:5", "90° is out of"),
+            ("-5", "-5° is out of"),
         ] {
             assert!(angles_deg(text).unwrap_err().contains(says), "{text}");
         }

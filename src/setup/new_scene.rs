@@ -1,5 +1,6 @@
 //! A scene to begin with, from a measured cloud and the mesh of its target.
 
+use std::collections::HashSet;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -110,10 +111,12 @@ impl NewScene<'_> {
     /// One ray to each point: `chirp,ox_m,oy_m,oz_m,dx,dy,dz`.
     fn rays(&self, radar_at: Point<Global>) -> Result<String, Error> {
         let mut text = "chirp,ox_m,oy_m,oz_m,dx,dy,dz\n".to_owned();
-        let is_numbered = self.cloud.points().iter().all(|point| point.chirp.is_some());
+        let points = self.cloud.points();
+        let taken: HashSet<u32> = points.iter().filter_map(|point| point.chirp).collect();
+        let mut free = (0..).filter(|number| !taken.contains(number));
         let [ox, oy, oz] = radar_at.xyz.to_array();
-        for (place, point) in (0..).zip(self.cloud.points()) {
-            let chirp = point.chirp.filter(|_| is_numbered).unwrap_or(place);
+        for (place, point) in points.iter().enumerate() {
+            let chirp = point.chirp.or_else(|| free.next()).unwrap_or_default();
             let direction = radar_at.towards(point.point).ok_or_else(|| {
                 let problem = format!("point {place} lies where the radar stood");
                 Error::usage(problem, "leave the point out, or check --radar-at")
@@ -191,7 +194,7 @@ impl NewScene<'_> {
              [[mesh]]\n\
              name = \"target\"\n\
              file = {mesh}\n\
-             # scale = 0.001                    # for a mesh in millimetres\n\
+             # scale = 0.001                    # for a mesh in millimetres; of builtin: ones the size is size_m\n\
              # rotation_deg = [0, 0, 0]\n\
              # translation_m = [0, 0, 0]\n\
              \n\

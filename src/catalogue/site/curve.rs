@@ -196,7 +196,9 @@ fn points(
 fn band(material: &Material, fit: &Fit) -> Option<Series> {
     let (mut points, mut upper) = (Vec::new(), Vec::new());
     for theta_deg in angles_deg(range_deg(material)) {
-        let Some(band) = stored_band(fit, theta_deg.to_radians()) else { continue };
+        let Some(band) = stored_band(fit, material.beam_rad(fit), theta_deg.to_radians()) else {
+            continue;
+        };
         let [low_db, high_db] = [band.low, band.high].map(db_from_ratio);
         if high_db >= FAINTEST_DB {
             points.push((theta_deg, low_db.max(FAINTEST_DB)));
@@ -218,7 +220,7 @@ pub(super) fn view(material: &Material, curve: &Curve) -> CurveView {
         kind: word(kind_of(material, &curve.source)),
         source: curve.source.clone(),
         source_place: place_of(material, &curve.source),
-        count: count(&curve.observations),
+        count: count(curve),
         instrument: instrument.map(instrument_view),
         lit: format!(
             "{}; {}",
@@ -230,11 +232,16 @@ pub(super) fn view(material: &Material, curve: &Curve) -> CurveView {
     }
 }
 
-fn count(observations: &[Observation]) -> String {
+fn count(curve: &Curve) -> String {
+    let observations = &curve.observations;
     let [left, right] = [Censor::Left, Censor::Right]
         .map(|censor| observations.iter().filter(|o| o.censor == censor).count());
     let all = observations.len();
     let mut text = format!("{} points.", grouped(all));
+    if curve.illumination.only_detected {
+        return text
+            + " Only detections were recorded: where few chirps pass the threshold, their mean is too high.";
+    }
     if left + right == 0 {
         return text + " All were detected.";
     }

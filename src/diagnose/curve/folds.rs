@@ -123,7 +123,7 @@ mod tests {
 
     #[test]
     fn repeats_of_an_angle_are_no_steps_between_angles() {
-        let mut points = curve_of(noisy(&[30.0], 1.0, 0.2, |_| 0.0));
+        let mut points = curve_of(&noisy(&[30.0], 1.0, 0.2, |_| 0.0), None);
         points.points = points.points.iter().flat_map(|point| [*point; 3]).collect();
         let key = |k| Key { seed: 5, chirp: k, sub_ray: 0, purpose: Purpose::Fit };
         let count = points.points.len() as u64;
@@ -135,7 +135,7 @@ mod tests {
 
     #[test]
     fn white_noise_is_held_out_in_short_runs_and_a_smooth_error_in_long_ones() {
-        let points = curve_of(noisy(&[10.0, 30.0, 50.0], 1.0, 0.2, |_| 0.0));
+        let points = curve_of(&noisy(&[10.0, 30.0, 50.0], 1.0, 0.2, |_| 0.0), None);
         let white: Vec<f64> = (0..points.points.len())
             .map(|k| {
                 let key = Key { seed: 5, chirp: k as u64, sub_ray: 0, purpose: Purpose::Fit };

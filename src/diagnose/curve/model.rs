@@ -1,7 +1,7 @@
 //! A scattering model with terms, fitted to the levels of a curve in dB.
 //!
-//! A level y is normal about the model's with a scale s; a censored one states that y lies below. s is the
-//! rms residual of the fit, and at least the noise: a wrong model must not appear certain.
+//! A level y is normal about the model's with a scale s, times its own spread; a censored one states that y lies below. s is
+//! the rms residual of the fit, and at least the noise: a wrong model must not appear certain.
 //! Held-out levels are scored by Student's distribution with four degrees of freedom and the same variance:
 //! the residual of a wrong model has tails, and a few angles must not decide alone.
 
@@ -61,7 +61,7 @@ impl Score {
             return Score { f_db, log_p: log_p(point, f_db, scale_db) };
         }
         // With four degrees of freedom the variance is twice the squared scale, and the peak density 3/8.
-        let width_db = scale_db * std::f64::consts::FRAC_1_SQRT_2;
+        let width_db = scale_db * point.spread * std::f64::consts::FRAC_1_SQRT_2;
         let z = (point.f_db - f_db) / width_db;
         let log_p = 0.375f64.ln() - width_db.ln() - 2.5 * (0.25 * z * z).ln_1p();
         Score { f_db, log_p }
@@ -188,7 +188,8 @@ impl Model {
     fn scale_db(&self, at: &DVector<f64>, points: &[Point], noise_db: f64) -> f64 {
         let levels = self.levels_db(at, points);
         let seen = points.iter().zip(&levels).filter(|(point, _)| !point.censored);
-        let squares: Vec<f64> = seen.map(|(point, db)| (point.f_db - db).powi(2)).collect();
+        let squares: Vec<f64> =
+            seen.map(|(point, db)| ((point.f_db - db) / point.spread).powi(2)).collect();
         let spare = squares.len().saturating_sub(self.unknowns()).max(1);
         (squares.iter().sum::<f64>() / spare as f64).sqrt().max(noise_db)
     }
@@ -214,13 +215,14 @@ impl Model {
         for (row, (point, level_db)) in points.iter().zip(&here).enumerate() {
             let jacobian: Vec<f64> =
                 moved.iter().map(|(step, there)| (there[row] - level_db) / step).collect();
-            let z = (point.f_db - level_db) / scale_db;
+            let own_db = scale_db * point.spread;
+            let z = (point.f_db - level_db) / own_db;
             let (first, second) = if point.censored {
                 // d/dμ of −ln Φ((T − μ)/s), and an expected curvature that is never negative.
                 let pull = mills(z);
-                (pull / scale_db, (pull * (pull + z)).max(0.0) / scale_db.powi(2))
+                (pull / own_db, (pull * (pull + z)).max(0.0) / own_db.powi(2))
             } else {
-                (-z / scale_db, scale_db.powi(-2))
+                (-z / own_db, own_db.powi(-2))
             };
             sum.add(first, second, &jacobian);
         }
@@ -260,11 +262,12 @@ fn cost(points: &[Point], levels_db: &[f64], scale_db: f64) -> f64 {
 
 /// ln p of a point about a model's level, both dB.
 fn log_p(point: &Point, level_db: f64, scale_db: f64) -> f64 {
-    let z = (point.f_db - level_db) / scale_db;
+    let own_db = scale_db * point.spread;
+    let z = (point.f_db - level_db) / own_db;
     if point.censored {
         return log_below(z);
     }
-    -0.5 * z * z - scale_db.ln() - 0.5 * std::f64::consts::TAU.ln()
+    -0.5 * z * z - own_db.ln() - 0.5 * std::f64::consts::TAU.ln()
 }
 
 /// ln Φ(z).

@@ -1,8 +1,9 @@
 //! A measured curve as points in the order of its scans, and the noise of its levels.
 //!
 //! The noise is the first of these that is known: the value that the caller declares, the scatter of repeats, the
-//! value that the file states, the scatter of a point about the line through its two neighbours. The last one takes every
-//! bend of the curve between them for noise and is an upper bound on coarse scans.
+//! values that the file states, the scatter of a point about the line through its two neighbours. The last one takes every
+//! bend of the curve between them for noise and is an upper bound on coarse scans. Noise is that of one row: a point that
+//! is the mean of n rows has 1/√n of it.
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -10,7 +11,7 @@ use std::f64::consts::PI;
 use serde::Serialize;
 
 use crate::frames::{Direction, Surface};
-use crate::material::file::in_plane::InPlane;
+use crate::material::Observation;
 use crate::measure::Curve;
 use crate::units::{db_from_ratio, ratio_from_db};
 
@@ -41,6 +42,8 @@ pub struct Point {
     pub censored: bool,
     /// Level of the file less 10·lg f, dB.
     pub offset_db: f64,
+    /// Noise of this level over that of the curve.
+    pub spread: f64,
     /// Which scan of the curve it belongs to: the number of its angle of incidence, or 0.
     pub scan: usize,
 }
@@ -62,7 +65,8 @@ pub enum NoiseSource {
 /// Noise of the levels.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Noise {
-    /// Standard deviation of a level, dB; infinite where it is unknown.
+    /// Standard deviation of a level, dB; infinite where it is unknown. Where levels have noise of their own, the one
+    /// that would determine a constant as well.
     pub sd_db: f64,
     /// Degrees of freedom that it was found with; infinite where it was stated.
     pub freedom: f64,
@@ -79,7 +83,8 @@ pub struct Points {
     pub points: Vec<Point>,
     /// The noise.
     pub noise: Noise,
-    /// Levels of each point in the order of the file, dB, where angles were repeated; else empty.
+    /// Levels of each point in the order of the file, dB, where angles were repeated; else empty. A point that is a limit
+    /// has none.
     pub repeats: Vec<Vec<f64>>,
 }
 
@@ -88,9 +93,9 @@ pub struct Points {
 pub(super) struct Contradiction {
     /// Their numbers, from 1, in the order of the file.
     pub repeats: [usize; 2],
-    /// Mean of the second less the first, dB.
+    /// The second less the first at the end of the angles where a line through the differences is farther from zero, dB.
     pub apart_db: f64,
-    /// Standard deviation of that difference over the angles, dB.
+    /// Standard deviation of the differences about that line, dB.
     pub scatter_db: f64,
 }
 
@@ -101,24 +106,46 @@ const BELOW: f64 = 0.8;
 /// That quantile of the absolute value of a standard normal number.
 const SIZE: f64 = 1.2816;
 
+/// Rows of one place, and what is stated of the noise of each, dB.
+type Group = Vec<(Point, Option<f64>)>;
+
 impl Points {
-    /// The points of a backscatter curve. Where angles are repeated, twice or more on average, and all were detected, they
-    /// become points of their mean level. Rows at grazing incidence, where σ⁰ does not determine f, are left out.
-    /// `sd_db` is what the file states of the deviation of each level.
-    pub fn backscatter(curve: &Curve, sd_db: &[Option<f64>], noise_db: Option<f64>) -> Points {
+    /// The points of a curve: of backscatter, where all its rows are, else in the plane of incidence. Repeats of an angle
+    /// become points of their mean level, in backscatter where half of the rows are repeats. `sd_db` is what the file
+    /// states of the deviation of each level, for none or for all rows.
+    ///
+    /// # Errors
+    /// The number of a row, from 1, that is out of the plane of incidence.
+    pub fn of_curve(
+        curve: &Curve,
+        sd_db: &[Option<f64>],
+        noise_db: Option<f64>,
+    ) -> Result<Points, usize> {
+        let rows = curve.observations.iter().enumerate();
+        let rows = rows.map(|(index, row)| (row, sd_db.get(index).copied().flatten()));
+        if curve.observations.iter().all(Observation::is_retro) {
+            return Ok(Points::backscatter(rows, noise_db));
+        }
+        let points = rows.enumerate().filter_map(|(index, (row, sd_db))| {
+            let level = row.level_sigma0()?;
+            Some(point_in_plane(row, level).map(|point| (point, sd_db)).ok_or(index + 1))
+        });
+        Ok(Points::in_plane(points.collect::<Result<Group, usize>>()?, noise_db))
+    }
+
+    /// Rows at grazing incidence, where σ⁰ does not determine f, are left out.
+    fn backscatter<'a>(
+        rows: impl Iterator<Item = (&'a Observation, Option<f64>)>,
+        noise_db: Option<f64>,
+    ) -> Points {
         const GRAZING_RAD: f64 = 1.569;
-        let of_levels = curve.observations.iter().zip(sd_db);
-        let of_levels = of_levels.filter(|(row, _)| !row.is_censored());
-        let sd_db: Vec<Option<f64>> = of_levels.map(|(_, sd_db)| *sd_db).collect();
-        let mut points: Vec<Point> = curve
-            .observations
-            .iter()
-            .filter(|row| row.theta_i_rad < GRAZING_RAD)
-            .filter_map(|row| {
+        let mut points: Group = rows
+            .filter(|(row, _)| row.theta_i_rad < GRAZING_RAD)
+            .filter_map(|(row, sd_db)| {
                 let theta_rad = row.theta_i_rad;
                 let i = Direction::from_angles(theta_rad, PI);
                 let offset_db = db_from_ratio(4.0 * PI * i.cos_theta().powi(2));
-                Some(Point {
+                let point = Point {
                     i,
                     o: i,
                     theta_i_rad: theta_rad,
@@ -126,28 +153,32 @@ impl Points {
                     f_db: db_from_ratio(row.level_sigma0()?) - offset_db,
                     censored: row.is_censored(),
                     offset_db,
+                    spread: 1.0,
                     scan: 0,
-                })
+                };
+                Some((point, sd_db))
             })
             .collect();
-        points.sort_by(|a, b| a.theta_i_rad.total_cmp(&b.theta_i_rad));
-        let groups = points.chunk_by(|a, b| place(a.theta_i_rad) == place(b.theta_i_rad));
-        let groups: Vec<Vec<Point>> = groups.map(<[Point]>::to_vec).collect();
+        points.sort_by(|a, b| a.0.theta_i_rad.total_cmp(&b.0.theta_i_rad));
+        let groups = points.chunk_by(|a, b| place(a.0.theta_i_rad) == place(b.0.theta_i_rad));
+        let repeated: usize = groups.clone().map(<[_]>::len).filter(|&rows| rows > 1).sum();
         // Angles of single chirps coincide by chance.
-        let are_repeats = points.len() >= 2 * groups.len();
-        if !are_repeats || points.iter().any(|point| point.censored) {
-            return Points::new(Kind::Backscatter, points, noise_db, stated(&sd_db));
-        }
-        Points::of_groups(Kind::Backscatter, groups, noise_db, stated(&sd_db))
+        let are_repeats = 2 * repeated >= points.len();
+        let has_limits = points.iter().any(|(point, _)| point.censored);
+        let groups: Vec<Group> = if are_repeats && !has_limits {
+            groups.map(<[_]>::to_vec).collect()
+        } else {
+            points.iter().map(|row| vec![*row]).collect()
+        };
+        Points::of_groups(Kind::Backscatter, &groups, noise_db)
     }
 
-    /// The points of values in the plane of incidence; repeats become their mean level.
-    pub fn in_plane(values: &[InPlane], noise_db: Option<f64>) -> Points {
-        let sd_db: Vec<Option<f64>> = values.iter().map(|value| value.sd_db).collect();
-        let mut places: BTreeMap<[i64; 2], Vec<Point>> = BTreeMap::new();
-        for value in values {
-            let key = [value.theta_i_rad, value.theta_s_rad].map(place);
-            places.entry(key).or_default().push(point_in_plane(value));
+    /// The points in the plane of incidence, scan by scan.
+    fn in_plane(rows: Group, noise_db: Option<f64>) -> Points {
+        let mut places: BTreeMap<[i64; 2], Group> = BTreeMap::new();
+        for row in rows {
+            let key = [row.0.theta_i_rad, row.0.theta_s_rad].map(place);
+            places.entry(key).or_default().push(row);
         }
         let mut scan = None;
         for (key, group) in &mut places {
@@ -157,45 +188,19 @@ impl Points {
                 None => 0,
             };
             scan = Some((key[0], number));
-            group.iter_mut().for_each(|point| point.scan = number);
+            group.iter_mut().for_each(|(point, _)| point.scan = number);
         }
-        Points::of_groups(Kind::InPlane, places.into_values().collect(), noise_db, stated(&sd_db))
+        let groups: Vec<Group> = places.into_values().collect();
+        Points::of_groups(Kind::InPlane, &groups, noise_db)
     }
 
-    /// The points of these groups of repeats, each the mean of its levels.
-    fn of_groups(
-        kind: Kind,
-        groups: Vec<Vec<Point>>,
-        noise_db: Option<f64>,
-        stated: Option<Noise>,
-    ) -> Points {
-        let levels: Vec<Vec<f64>> =
-            groups.iter().map(|group| group.iter().map(|point| point.f_db).collect()).collect();
-        let points = groups.iter().filter_map(|group| mean_point(group)).collect();
+    /// The points of these groups of rows, each the mean of its levels.
+    fn of_groups(kind: Kind, groups: &[Group], noise_db: Option<f64>) -> Points {
+        let mut points: Vec<Point> = groups.iter().filter_map(|group| mean_point(group)).collect();
+        let levels: Vec<Vec<f64>> = groups.iter().map(|group| levels(group)).collect();
+        let noise = noise(&mut points, groups, &levels, noise_db);
         let has_repeats = levels.iter().any(|levels| levels.len() > 1);
-        let of_file = repeats(&levels).or(stated);
-        let repeats = if has_repeats { levels } else { Vec::new() };
-        Points { repeats, ..Points::new(kind, points, noise_db, of_file) }
-    }
-
-    fn new(
-        kind: Kind,
-        points: Vec<Point>,
-        noise_db: Option<f64>,
-        of_file: Option<Noise>,
-    ) -> Points {
-        let noise = match noise_db {
-            Some(sd_db) => Noise { sd_db, freedom: f64::INFINITY, source: NoiseSource::Declared },
-            None => {
-                let known = of_file.unwrap_or_else(|| Noise {
-                    sd_db: neighbours(&points).unwrap_or(f64::INFINITY),
-                    freedom: points.len() as f64,
-                    source: NoiseSource::Neighbours,
-                });
-                Noise { sd_db: known.sd_db.max(LEAST_NOISE_DB), ..known }
-            }
-        };
-        Points { kind, points, noise, repeats: Vec::new() }
+        Points { kind, points, noise, repeats: if has_repeats { levels } else { Vec::new() } }
     }
 
     /// Whether the noise is known, and not taken from the curve's own bends.
@@ -205,48 +210,33 @@ impl Points {
 
     /// One of the repeats, from 0, by itself. One level scatters more than the mean of several.
     pub(super) fn repeat(&self, number: usize) -> Points {
-        let (mut points, mut counts) = (Vec::new(), 0.0);
-        for (point, levels) in self.points.iter().zip(&self.repeats) {
-            if let Some(&f_db) = levels.get(number) {
-                points.push(Point { f_db, ..*point });
-                counts += levels.len() as f64;
-            }
-        }
-        let more = (counts / points.len().max(1) as f64).sqrt();
-        let noise = Noise { sd_db: more * self.noise.sd_db, ..self.noise };
-        Points { kind: self.kind, points, noise, repeats: Vec::new() }
+        let pairs = self.points.iter().zip(&self.repeats);
+        let points = pairs.filter_map(|(point, levels)| {
+            let spread = point.spread * (levels.len() as f64).sqrt();
+            levels.get(number).map(|&f_db| Point { f_db, spread, ..*point })
+        });
+        Points { points: points.collect(), repeats: Vec::new(), ..*self }
     }
 
-    /// Two repeats that are of different levels throughout, if there are any.
+    /// Two repeats whose difference a line over the angles follows far from zero, if there are any.
     pub(super) fn contradiction(&self) -> Option<Contradiction> {
-        /// Points that two repeats must share to be compared.
-        const LEAST_SHARED: usize = 8;
-        /// Standard errors of the mean difference, and its size, dB, from which on it is no chance.
-        const ERRORS: f64 = 5.0;
-        const LEAST_DB: f64 = 1.0;
         let most = self.repeats.iter().map(Vec::len).max().unwrap_or(0);
         let pairs = (0..most).flat_map(|a| (a + 1..most).map(move |b| [a, b]));
         let contradictions = pairs.filter_map(|[a, b]| {
-            let both =
-                self.repeats.iter().filter_map(|levels| Some(levels.get(b)? - levels.get(a)?));
-            let off: Vec<f64> = both.collect();
-            let count = off.len() as f64;
-            let mean_db = off.iter().sum::<f64>() / count;
-            let squares: f64 = off.iter().map(|db| (db - mean_db).powi(2)).sum();
-            let scatter_db = (squares / (count - 1.0)).sqrt();
-            let is_chance = mean_db.abs() < LEAST_DB.max(ERRORS * scatter_db / count.sqrt());
-            (off.len() >= LEAST_SHARED && !is_chance).then_some(Contradiction {
-                repeats: [a + 1, b + 1],
-                apart_db: mean_db,
-                scatter_db,
-            })
+            let both = self.points.iter().zip(&self.repeats);
+            let both = both.filter_map(|(point, levels)| {
+                Some((self.angle_rad(point), levels.get(b)? - levels.get(a)?))
+            });
+            let (apart_db, scatter_db) = far_apart_db(&both.collect::<Vec<(f64, f64)>>())?;
+            Some(Contradiction { repeats: [a + 1, b + 1], apart_db, scatter_db })
         });
         contradictions.max_by(|a, b| a.apart_db.abs().total_cmp(&b.apart_db.abs()))
     }
 
-    /// Measured less predicted levels, dB.
+    /// Measured less predicted levels, dB, over the spread of each: all of them have the noise of the curve.
     pub(super) fn residuals_db(&self, levels_db: &[f64]) -> Vec<f64> {
-        self.points.iter().zip(levels_db).map(|(point, db)| point.f_db - db).collect()
+        let pairs = self.points.iter().zip(levels_db);
+        pairs.map(|(point, db)| (point.f_db - db) / point.spread).collect()
     }
 
     /// The angle that a scan runs over, rad.
@@ -271,53 +261,123 @@ fn place(angle_rad: f64) -> i64 {
     (angle_rad.to_degrees() * 1e4).round() as i64
 }
 
-/// A value in the plane of incidence as a point.
-fn point_in_plane(value: &InPlane) -> Point {
-    let side = if value.theta_s_rad < 0.0 { PI } else { 0.0 };
-    Point {
-        i: Direction::from_angles(value.theta_i_rad, PI),
-        o: Direction::from_angles(value.theta_s_rad.abs(), side),
-        theta_i_rad: value.theta_i_rad,
-        theta_s_rad: value.theta_s_rad,
-        f_db: db_from_ratio(value.f_per_sr),
-        censored: false,
+/// A row in the plane of incidence, of this level of σ⁰, as a point; `None` out of that plane.
+fn point_in_plane(row: &Observation, sigma0: f64) -> Option<Point> {
+    let aspect = row.aspect();
+    let theta_s_rad = aspect.theta_s_rad()?;
+    let side = if theta_s_rad < 0.0 { PI } else { 0.0 };
+    Some(Point {
+        i: Direction::from_angles(row.theta_i_rad, PI),
+        o: Direction::from_angles(theta_s_rad.abs(), side),
+        theta_i_rad: row.theta_i_rad,
+        theta_s_rad,
+        f_db: db_from_ratio(sigma0 / aspect.sigma0_per_f()),
+        censored: row.is_censored(),
         offset_db: 0.0,
+        spread: 1.0,
         scan: 0,
+    })
+}
+
+/// Repeats of a point as one of their mean level. Where one of them is a limit, so is the mean.
+fn mean_point(group: &[(Point, Option<f64>)]) -> Option<Point> {
+    let (first, _) = group.first()?;
+    let sum: f64 = group.iter().map(|(point, _)| point.f_db).sum();
+    let censored = group.iter().any(|(point, _)| point.censored);
+    Some(Point { f_db: sum / group.len() as f64, censored, ..*first })
+}
+
+/// The levels of repeats, dB; none where one of them is a limit.
+fn levels(group: &[(Point, Option<f64>)]) -> Vec<f64> {
+    let levels = group.iter().map(|(point, _)| (!point.censored).then_some(point.f_db));
+    levels.collect::<Option<Vec<f64>>>().unwrap_or_default()
+}
+
+/// The noise of points, whose spreads it sets.
+fn noise(
+    points: &mut [Point],
+    groups: &[Group],
+    levels: &[Vec<f64>],
+    declared_db: Option<f64>,
+) -> Noise {
+    let of_means = |sd_db: f64| groups.iter().map(|g| sd_db / (g.len() as f64).sqrt()).collect();
+    let (sds_db, freedom, source): (Vec<f64>, f64, NoiseSource) = if let Some(sd_db) = declared_db {
+        (of_means(sd_db), f64::INFINITY, NoiseSource::Declared)
+    } else if let Some((sd_db, freedom)) = of_repeats(levels) {
+        (of_means(sd_db.max(LEAST_NOISE_DB)), freedom, NoiseSource::Repeats)
+    } else if let Some(sds_db) = stated(groups) {
+        (sds_db, f64::INFINITY, NoiseSource::File)
+    } else {
+        let sd_db = neighbours(points).map_or(f64::INFINITY, |db| db.max(LEAST_NOISE_DB));
+        (vec![sd_db; points.len()], points.len() as f64, NoiseSource::Neighbours)
+    };
+    let first_db = sds_db.first().copied().unwrap_or(f64::INFINITY);
+    if sds_db.iter().all(|sd_db| *sd_db == first_db) {
+        return Noise { sd_db: first_db, freedom, source };
     }
+    let inverse = sds_db.iter().map(|sd_db| sd_db.powi(-2)).sum::<f64>() / sds_db.len() as f64;
+    let sd_db = inverse.powf(-0.5);
+    for (point, own_db) in points.iter_mut().zip(&sds_db) {
+        point.spread = own_db / sd_db;
+    }
+    Noise { sd_db, freedom, source }
 }
 
-/// Repeats of a point as one of their mean level.
-fn mean_point(group: &[Point]) -> Option<Point> {
-    let first = group.first()?;
-    let sum: f64 = group.iter().map(|point| point.f_db).sum();
-    Some(Point { f_db: sum / group.len() as f64, ..*first })
-}
-
-/// Noise of a mean of repeats, from the scatter of the levels of each point.
-fn repeats(levels: &[Vec<f64>]) -> Option<Noise> {
-    let (mut squares, mut spare, mut inverse) = (0.0, 0.0, 0.0);
-    for levels in levels {
+/// Noise of one level, dB, from the scatter of repeats, and its degrees of freedom.
+fn of_repeats(levels: &[Vec<f64>]) -> Option<(f64, f64)> {
+    let (mut squares, mut spare) = (0.0, 0.0);
+    for levels in levels.iter().filter(|levels| !levels.is_empty()) {
         let count = levels.len() as f64;
         let mean = levels.iter().sum::<f64>() / count;
         squares += levels.iter().map(|level| (level - mean).powi(2)).sum::<f64>();
         spare += count - 1.0;
-        inverse += 1.0 / count;
     }
     /// Degrees of freedom that a scatter needs.
     const LEAST_SPARE: f64 = 5.0;
-    (spare >= LEAST_SPARE).then(|| Noise {
-        sd_db: (squares / spare * inverse / levels.len() as f64).sqrt(),
-        freedom: spare,
-        source: NoiseSource::Repeats,
-    })
+    (spare >= LEAST_SPARE).then(|| ((squares / spare).sqrt(), spare))
 }
 
-/// Noise that the file states.
-fn stated(sd_db: &[Option<f64>]) -> Option<Noise> {
-    let known: Option<Vec<f64>> = sd_db.iter().copied().collect();
-    let known = known.filter(|known| !known.is_empty())?;
-    let square = known.iter().map(|sd| sd * sd).sum::<f64>() / known.len() as f64;
-    Some(Noise { sd_db: square.sqrt(), freedom: f64::INFINITY, source: NoiseSource::File })
+/// Noise of each point, dB, if all rows state theirs; a limit need not.
+fn stated(groups: &[Group]) -> Option<Vec<f64>> {
+    let mut sds_db = Vec::with_capacity(groups.len());
+    let rows: Vec<f64> = groups.iter().flatten().filter_map(|(_, sd_db)| *sd_db).collect();
+    let middle_db = (rows.iter().map(|sd| sd * sd).sum::<f64>() / rows.len() as f64).sqrt();
+    for group in groups {
+        let squares = group.iter().map(|(point, sd_db)| {
+            let limit_db = point.censored.then_some(middle_db);
+            sd_db.or(limit_db).map(|sd_db| sd_db.max(LEAST_NOISE_DB).powi(2))
+        });
+        let squares: f64 = squares.collect::<Option<Vec<f64>>>()?.iter().sum();
+        sds_db.push(squares.sqrt() / group.len() as f64);
+    }
+    (!rows.is_empty()).then_some(sds_db)
+}
+
+/// How far a line through differences of two repeats over the angle is from zero at its farther end, dB, and the scatter
+/// about it; `None` where chance may make it, or noise.
+fn far_apart_db(differences: &[(f64, f64)]) -> Option<(f64, f64)> {
+    /// Points that two repeats must share to be compared.
+    const LEAST_SHARED: usize = 8;
+    /// Standard errors of the difference, and its size, dB, from which on it is no chance.
+    const ERRORS: f64 = 5.0;
+    const LEAST_DB: f64 = 1.0;
+    if differences.len() < LEAST_SHARED {
+        return None;
+    }
+    let count = differences.len() as f64;
+    let [x, y] = differences.iter().fold([0.0; 2], |[x, y], d| [x + d.0 / count, y + d.1 / count]);
+    let spread: f64 = differences.iter().map(|d| (d.0 - x).powi(2)).sum();
+    let slope = differences.iter().map(|d| (d.0 - x) * (d.1 - y)).sum::<f64>() / spread;
+    let slope = if slope.is_finite() { slope } else { 0.0 };
+    let left: f64 = differences.iter().map(|d| (d.1 - y - slope * (d.0 - x)).powi(2)).sum();
+    let scatter_db = (left / (count - 2.0)).sqrt();
+    let ends = differences.iter().map(|(at, _)| {
+        let error_db = scatter_db * (1.0 / count + (at - x).powi(2) / spread.max(1e-30)).sqrt();
+        (y + slope * (at - x), error_db)
+    });
+    let far = ends.filter(|(db, error_db)| db.abs() >= LEAST_DB.max(ERRORS * error_db));
+    let farthest = far.max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
+    farthest.map(|(apart_db, _)| (apart_db, scatter_db))
 }
 
 /// Scatter about the line through the neighbours, dB; `None` where no scan has three angles.

@@ -102,7 +102,7 @@ fn held_out_with_smooth(selection: &Selection, state: &State, covariate: &Covari
         let rms_db = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
         let scale_db = rms_db.max(points.noise.sd_db);
         for (index, score) in after.iter_mut().enumerate().filter(|(index, _)| !used(*index)) {
-            let f_db = levels_db[index] + bend_db[index];
+            let f_db = levels_db[index] + bend_db[index] * points.points[index].spread;
             *score = Score::new(&points.points[index], f_db, scale_db);
         }
     }
@@ -123,7 +123,7 @@ fn correlated(selection: &Selection, state: &State) -> Option<CurveUnknown> {
     is_found.then(|| unknown("neighbouring angles", strength_db, p_value))
 }
 
-/// Measured less predicted levels under a fit, dB.
+/// Measured less predicted levels under a fit over their spreads, dB.
 fn residuals_of(points: &Points, state: &State, fit: &Fit) -> Vec<f64> {
     points.residuals_db(&state.model.levels_db(&fit.at, &points.points))
 }

@@ -79,7 +79,8 @@ impl CurveErrors {
     /// The errors of a model from its scores.
     pub(super) fn of(points: &Points, scores: &[Score]) -> CurveErrors {
         let pairs = points.points.iter().zip(scores).filter(|(point, _)| !point.censored);
-        let errors: Vec<f64> = pairs.map(|(point, score)| point.f_db - score.f_db).collect();
+        let errors: Vec<f64> =
+            pairs.map(|(point, score)| (point.f_db - score.f_db) / point.spread).collect();
         let count = errors.len().max(1) as f64;
         CurveErrors {
             rmse_db: (errors.iter().map(|e| e * e).sum::<f64>() / count).sqrt(),

@@ -241,9 +241,9 @@ fn joined(at: &DVector<f64>, term: &dyn Term, values: &[f64]) -> DVector<f64> {
     DVector::from_vec(at.iter().copied().chain(more).collect())
 }
 
-/// Sum of the squared residuals of the detections, dB².
+/// Sum of the squared residuals of the detections over their spreads, dB².
 fn misfit(model: &Model, at: &DVector<f64>, points: &Points) -> f64 {
     let levels_db = model.levels_db(at, &points.points);
     let pairs = points.points.iter().zip(levels_db).filter(|(point, _)| !point.censored);
-    pairs.map(|(point, db)| (point.f_db - db).powi(2)).sum()
+    pairs.map(|(point, db)| ((point.f_db - db) / point.spread).powi(2)).sum()
 }

@@ -3,6 +3,7 @@
 use super::points::{Kind, Point, Points};
 use crate::brdf::{Brdf, Scattering};
 use crate::material::file::in_plane::InPlane;
+use crate::measure::Curve;
 use crate::radar::random::{Key, Purpose};
 use crate::units::{db_from_ratio, ratio_from_db};
 
@@ -15,7 +16,7 @@ fn angles(incidences_deg: &[f64], step_deg: f64) -> Vec<[f64; 2]> {
 
 /// Points of a law without noise.
 pub(super) fn in_plane(law: &Brdf, incidences_deg: &[f64], step_deg: f64) -> Vec<Point> {
-    let points = curve_of(noisy(incidences_deg, step_deg, 0.0, |_| 0.0)).points;
+    let points = curve_of(&noisy(incidences_deg, step_deg, 0.0, |_| 0.0), None).points;
     let level = |p: Point| Point { f_db: db_from_ratio(law.f_per_sr(p.i, p.o)), ..p };
     points.into_iter().map(level).collect()
 }
@@ -31,10 +32,9 @@ pub(super) fn noisy(
         theta_i_rad: i.to_radians(),
         theta_s_rad: s.to_radians(),
         f_per_sr: 1.0,
-        sd_db: None,
     };
     let values: Vec<InPlane> = angles(incidences_deg, step_deg).into_iter().map(bare).collect();
-    let points = Points::in_plane(&values, Some(1.0)).points;
+    let points = curve_of(&values, Some(1.0)).points;
     values
         .into_iter()
         .zip(&points)
@@ -53,8 +53,11 @@ pub(super) fn normal(index: usize) -> f64 {
     (0..12).map(|_| draws.uniform()).sum::<f64>() - 6.0
 }
 
-pub(super) fn curve_of(values: Vec<InPlane>) -> Points {
-    let points = Points::in_plane(&values, None);
+/// The points of values in the plane of incidence.
+pub(super) fn curve_of(values: &[InPlane], noise_db: Option<f64>) -> Points {
+    let observations = values.iter().map(InPlane::observation).collect();
+    let curve = Curve { observations, ..Curve::default() };
+    let points = Points::of_curve(&curve, &[], noise_db).unwrap();
     assert_eq!(points.kind, Kind::InPlane);
     points
 }

@@ -6,7 +6,10 @@ use super::model::Model;
 use super::testing::{curve_of, noisy};
 use super::*;
 use crate::brdf::{Brdf, Scattering};
+use crate::formats::ColumnNames;
 use crate::material::file::in_plane::InPlane;
+use crate::material::file::points;
+use crate::material::{Censor, Observation};
 use crate::measure::Curve;
 use crate::units::{db_from_ratio, ratio_from_db};
 
@@ -32,7 +35,7 @@ fn values_with(name: &str, numbers: &[f64]) -> Vec<InPlane> {
 
 /// The same, with its noise declared.
 fn curve_with(name: &str, numbers: &[f64]) -> Points {
-    Points::in_plane(&values_with(name, numbers), Some(NOISE_DB))
+    curve_of(&values_with(name, numbers), Some(NOISE_DB))
 }
 
 fn diagnosed(points: &Points) -> CurveReport {
@@ -44,7 +47,7 @@ fn a_complete_curve_lacks_nothing() {
     let report = diagnosed(&curve_with("", &[]));
     assert_eq!(report.verdict, CurveVerdict::NoMissingEffect, "{report:#?}");
     assert!(report.laws.len() == 1 && report.ranking.is_empty(), "no other law was asked for");
-    let report = diagnosed(&curve_of(values_with("", &[])));
+    let report = diagnosed(&curve_of(&values_with("", &[]), None));
     assert_eq!(report.verdict, CurveVerdict::NoiseUnknown, "{report:#?}");
     assert_eq!(report.error.noise_source, NoiseSource::Neighbours);
     assert!((report.error.noise_floor_db / NOISE_DB - 1.0).abs() < 0.15, "{:?}", report.error);
@@ -97,7 +100,7 @@ fn an_offset_of_the_angle_is_found_within_its_deviations() {
             let level_db = db_from_ratio(term.scatter(&[OFFSET_DEG], &law, point, f));
             level_db + NOISE_DB * testing::normal(count.get())
         });
-        Points::in_plane(&values, Some(NOISE_DB))
+        curve_of(&values, Some(NOISE_DB))
     };
     let report = diagnosed(&drawn(1));
     assert_eq!(report.effects.len(), 1, "{report:#?}");
@@ -146,14 +149,14 @@ fn what_neither_a_law_nor_a_term_is_like_stays_unknown() {
         let apart_deg = (point.theta_s_rad - point.theta_i_rad).to_degrees();
         db_from_ratio(law.f_per_sr(point.i, point.o)) + if apart_deg < -60.0 { 1.0 } else { 0.0 }
     });
-    let report = diagnosed(&Points::in_plane(&step, Some(NOISE_DB)));
+    let report = diagnosed(&curve_of(&step, Some(NOISE_DB)));
     assert_eq!(report.verdict, CurveVerdict::Unexplained, "{report:#?}");
     assert!(report.effects.is_empty());
     assert!(report.unexplained.iter().all(|found| found.name == "unknown"));
     // White noise of 5 dB that was declared as 0.1 dB.
     let white =
         noisy(&INCIDENCES_DEG, 2.0, 5.0, |point| db_from_ratio(law.f_per_sr(point.i, point.o)));
-    let report = diagnosed(&Points::in_plane(&white, Some(0.1)));
+    let report = diagnosed(&curve_of(&white, Some(0.1)));
     assert_eq!(report.verdict, CurveVerdict::Unexplained, "{report:#?}");
     assert_eq!(report.unexplained.last().unwrap().covariate, "scatter");
     // A model error of 0.12 dB beside a noise of 0.03 dB.
@@ -191,8 +194,12 @@ fn an_effect_must_hold_in_every_repeat() {
         .map(|(name, numbers)| values_with(name, &numbers));
     let repeated = |film_in_second: bool| {
         let second = if film_in_second { &film } else { &clean };
-        let values: Vec<InPlane> = film.iter().chain(second).copied().collect();
-        diagnosed(&Points::in_plane(&values, Some(NOISE_DB)))
+        let mut values = film.clone();
+        values.extend(second.iter().enumerate().map(|(index, value)| {
+            let more_db = NOISE_DB * (testing::normal(10_000 + index) - testing::normal(index));
+            InPlane { f_per_sr: value.f_per_sr * ratio_from_db(more_db), ..*value }
+        }));
+        diagnosed(&curve_of(&values, Some(NOISE_DB)))
     };
     let both = repeated(true);
     assert_eq!(both.effects[0].name, "thin-film", "{both:#?}");
@@ -215,7 +222,7 @@ fn backscatter_of(
             db_from_ratio(sigma0(theta_deg.to_radians())) + noise_db * testing::normal(k);
         text += &format!("{theta_deg},{level_db:.4}\n");
     }
-    Points::backscatter(&Curve::read(text.as_bytes()).unwrap(), &[], Some(noise_db))
+    Points::of_curve(&Curve::read(text.as_bytes()).unwrap(), &[], Some(noise_db)).unwrap()
 }
 
 /// A backscatter curve every half degree, with a threshold.
@@ -230,7 +237,7 @@ fn backscatter(threshold_db: f64, extra: impl Fn(f64) -> f64) -> Points {
         let censored = u8::from(level_db < threshold_db);
         text += &format!("{theta_deg},{:.3},{censored}\n", level_db.max(threshold_db));
     }
-    Points::backscatter(&Curve::read(text.as_bytes()).unwrap(), &[], Some(NOISE_DB))
+    Points::of_curve(&Curve::read(text.as_bytes()).unwrap(), &[], Some(NOISE_DB)).unwrap()
 }
 
 #[test]
@@ -244,22 +251,23 @@ fn backscatter_is_diagnosed_with_its_silent_angles() {
     assert!(((sigma_v.value - 0.02) / sigma_v.sd.unwrap()).abs() < 3.5, "{sigma_v:?}");
 }
 
-/// Two runs over the same angles, the second higher by so much.
-fn two_runs(apart_db: f64) -> Points {
+/// Two runs over the same angles, the second higher by so much at normal incidence and at the other end.
+fn two_runs([near_db, far_db]: [f64; 2]) -> Points {
     let law = law();
     let mut text = "theta_deg,sigma0_db\n".to_owned();
     for k in 0..160usize {
         let theta_deg = (k % 80) as f64;
         let level_db = db_from_ratio(law.sigma0(theta_deg.to_radians()));
+        let apart_db = near_db + (far_db - near_db) * (k % 80) as f64 / 79.0;
         let level_db = level_db + NOISE_DB * testing::normal(k) + apart_db * (k / 80) as f64;
         text += &format!("{theta_deg},{level_db:.4}\n");
     }
-    Points::backscatter(&Curve::read(text.as_bytes()).unwrap(), &[], None)
+    Points::of_curve(&Curve::read(text.as_bytes()).unwrap(), &[], None).unwrap()
 }
 
 #[test]
 fn repeats_of_backscatter_give_the_noise() {
-    let points = two_runs(0.0);
+    let points = two_runs([0.0; 2]);
     assert_eq!((points.points.len(), points.noise.source), (80, NoiseSource::Repeats));
     assert!((points.noise.sd_db * 2f64.sqrt() / NOISE_DB - 1.0).abs() < 0.2, "{:?}", points.noise);
     let report = diagnosed(&points);
@@ -269,21 +277,96 @@ fn repeats_of_backscatter_give_the_noise() {
 #[test]
 fn repeats_that_contradict_each_other_are_refused() {
     let run = |points: &Points| CurveDiagnosis::default().run(points, &law(), &terms());
-    let error = run(&two_runs(6.0)).unwrap_err().to_string();
+    let error = run(&two_runs([6.0; 2])).unwrap_err().to_string();
     assert!(
         error.starts_with("repeats 1 and 2 of the angles contradict each other: they are 6.0 dB"),
         "{error}"
     );
-    assert!(run(&two_runs(0.5)).is_ok());
+    let error = run(&two_runs([-3.0, 3.0])).unwrap_err().to_string();
+    assert!(error.contains("contradict each other: they are 3."), "{error}");
+    assert!(run(&two_runs([0.5; 2])).is_ok());
+}
+
+#[test]
+fn a_single_angle_among_repeats_stays_a_point() {
+    let mut text = "theta_deg,sigma0_db\n71.5,-20\n".to_owned();
+    for k in 0..144usize {
+        let theta_deg = (k % 72) as f64;
+        let level_db = db_from_ratio(law().sigma0(theta_deg.to_radians()));
+        text += &format!("{theta_deg},{:.4}\n", level_db + NOISE_DB * testing::normal(k));
+    }
+    let curve = Curve::read(text.as_bytes()).unwrap();
+    let points = Points::of_curve(&curve, &[], None).unwrap();
+    assert_eq!((points.points.len(), points.noise.source), (73, NoiseSource::Repeats));
+    // One level scatters more than the mean of two.
+    let [pair, single] = [points.points[0].spread, points.points[72].spread];
+    assert!((single / pair - 2f64.sqrt()).abs() < 1e-12, "{pair} {single}");
+}
+
+#[test]
+fn declared_noise_is_that_of_a_row() {
+    let values = values_with("", &[]);
+    let many: Vec<InPlane> = (0..9).flat_map(|_| values.clone()).collect();
+    let points = curve_of(&many, Some(0.3));
+    assert!((points.noise.sd_db - 0.1).abs() < 1e-12, "{:?}", points.noise);
+    let one = points.repeat(8);
+    assert!((one.noise.sd_db * one.points[0].spread - 0.3).abs() < 1e-12);
+}
+
+#[test]
+fn levels_with_noise_of_their_own_are_weighed_by_it() {
+    // Half a decibel is missing where the noise is 0.05 dB; it is 2 dB at the other angles.
+    let drawn = |missing_db: f64| {
+        let law = law();
+        let mut text = "theta_deg,sigma0_db,sd_db\n".to_owned();
+        for k in 0..160usize {
+            let theta_deg = 0.5 * k as f64;
+            let sd_db = if theta_deg < 40.0 { 0.05 } else { 2.0 };
+            let bend_db = missing_db * (theta_deg / 6.0).sin();
+            let level_db = db_from_ratio(law.sigma0(theta_deg.to_radians())) + bend_db;
+            text += &format!("{theta_deg},{:.4},{sd_db}\n", level_db + sd_db * testing::normal(k));
+        }
+        let table = points(text.as_bytes(), &ColumnNames::default()).unwrap();
+        let sd_db = table.sd_db.clone();
+        let (curve, _) = Curve::of_points(table).unwrap();
+        diagnosed(&Points::of_curve(&curve, &sd_db, None).unwrap())
+    };
+    let complete = drawn(0.0);
+    assert_eq!(complete.verdict, CurveVerdict::NoMissingEffect, "{complete:#?}");
+    assert!((complete.error.noise_floor_db - 0.05 * 2f64.sqrt()).abs() < 0.001);
+    let missing = drawn(0.5);
+    assert_ne!(missing.verdict, CurveVerdict::NoMissingEffect, "{missing:#?}");
+}
+
+#[test]
+fn limits_in_the_plane_of_incidence_hold_a_law_down() {
+    // Beyond 40° behind the normal nothing is above a blank so far above the law.
+    let drawn = |above_db: f64| {
+        let law = law();
+        let values = values_with("", &[]);
+        let observations = values.iter().map(InPlane::observation).map(|row| {
+            if row.aspect().theta_s_rad().unwrap() > -0.7 {
+                return row;
+            }
+            let limit = row.aspect().sigma0(&law) * ratio_from_db(above_db);
+            Observation { sigma0: None, censor: Censor::Left, threshold_sigma0: Some(limit), ..row }
+        });
+        let curve = Curve { observations: observations.collect(), ..Curve::default() };
+        diagnosed(&Points::of_curve(&curve, &[], Some(NOISE_DB)).unwrap())
+    };
+    let complete = drawn(3.0);
+    assert_eq!(complete.verdict, CurveVerdict::NoMissingEffect, "{complete:#?}");
+    assert!(complete.curve.censored > 50, "{:?}", complete.curve);
+    assert_ne!(drawn(-10.0).verdict, CurveVerdict::NoMissingEffect);
 }
 
 #[test]
 fn too_little_is_refused() {
     let law = base_law();
     let run = |points: &Points| CurveDiagnosis::default().run(points, &law, &terms()).unwrap_err();
-    let few = curve_of(noisy(&[30.0], 10.0, 0.1, |_| -10.0));
+    let few = curve_of(&noisy(&[30.0], 10.0, 0.1, |_| -10.0), None);
     assert!(matches!(run(&few), CurveDiagnoseError::TooFew { detected: 17 }));
-    let short = curve_of(noisy(&[30.0], 2.0, 0.1, |_| -10.0));
+    let short = curve_of(&noisy(&[30.0], 2.0, 0.1, |_| -10.0), None);
     let none = Points { noise: Noise { sd_db: 0.0, ..short.noise }, ..short };
     assert!(matches!(run(&none), CurveDiagnoseError::Noise { .. }));
 }

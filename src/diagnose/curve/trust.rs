@@ -5,9 +5,12 @@ use std::f64::consts::TAU;
 use super::points::Points;
 use super::select::{Addition, State};
 use super::terms::{Term, ThinFilm};
+use crate::brdf::{Brdf, Scattering};
 
 /// Fringes that a film shows over the angles of the curve.
 const LEAST_FRINGES: f64 = 1.0;
+/// Share of the lobes in a level from which on their fringes show.
+const LEAST_SHARE: f64 = 0.25;
 /// Levels that a repeat needs to count.
 const LEAST_LEVELS: usize = 12;
 /// Share of the mean gain of all repeats that each must have.
@@ -22,10 +25,11 @@ pub(super) fn are_trusted(
     after: &State,
     added: &[Addition],
 ) -> bool {
-    let (_, values) = after.model.numbers(&after.fitted.at);
+    let (law, values) = after.model.numbers(&after.fitted.at);
     added.iter().zip(&values).all(|(one, values)| {
         is_inside(one.term, values)
-            && (one.term.name() != ThinFilm.name() || fringes(points, values) >= LEAST_FRINGES)
+            && (one.term.name() != ThinFilm.name()
+                || fringes(points, &law, values) >= LEAST_FRINGES)
     }) && holds_in_repeats(points, before, after)
 }
 
@@ -38,9 +42,12 @@ fn is_inside(term: &dyn Term, values: &[f64]) -> bool {
     })
 }
 
-/// Fringes of a film from the least to the largest path through it among the detected levels.
-fn fringes(points: &Points, values: &[f64]) -> f64 {
-    let seen = points.points.iter().filter(|point| !point.censored);
+/// Fringes of a film from the least to the largest path through it among the detected levels that the lobes have a share in.
+fn fringes(points: &Points, law: &Brdf, values: &[f64]) -> f64 {
+    let seen = points
+        .points
+        .iter()
+        .filter(|point| !point.censored && law.specular_share(point.i, point.o) >= LEAST_SHARE);
     let phases = seen.map(|point| ThinFilm::phase_rad(values, point));
     let (least, most) = phases.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), phase| {
         (least.min(phase), most.max(phase))
@@ -65,14 +72,20 @@ fn holds_in_repeats(points: &Points, before: &State, after: &State) -> bool {
 mod tests {
     use super::*;
     use crate::diagnose::curve::base_law;
-    use crate::diagnose::curve::testing::in_plane;
+    use crate::diagnose::curve::testing::{curve_of, in_plane, noisy};
 
     #[test]
     fn a_film_of_a_fifth_of_a_wavelength_shows_less_than_a_fringe() {
-        let points = in_plane(&base_law(), &[10.0, 30.0, 50.0, 70.0], 5.0);
-        let points = Points { points, ..crate::diagnose::curve::testing::curve_of(Vec::new()) };
-        assert!(fringes(&points, &[0.9, 0.2]) < 0.2);
-        assert!(fringes(&points, &[0.4, 3.2]) > 1.4);
+        let mut law = base_law();
+        law.set_parameter("0.albedo", 0.0);
+        let points = in_plane(&law, &[10.0, 30.0, 50.0, 70.0], 5.0);
+        let points = Points { points, ..curve_of(&noisy(&[10.0], 5.0, 0.0, |_| 0.0), None) };
+        assert!(fringes(&points, &law, &[0.9, 0.2]) < 0.2);
+        assert!(fringes(&points, &law, &[0.4, 3.2]) > 1.4);
+        // A lobe of 3° beside a diffuse part: no fringe shows where only that returns.
+        law.set_parameter("0.albedo", 0.1);
+        law.set_parameter("1.m", 0.05);
+        assert!(fringes(&points, &law, &[0.4, 3.2]) < 0.2);
     }
 
     #[test]

@@ -23,8 +23,6 @@ pub struct InPlane {
     pub theta_s_rad: f64,
     /// f, 1/sr, above 0.
     pub f_per_sr: f64,
-    /// Standard deviation, dB, where it is known.
-    pub sd_db: Option<f64>,
 }
 
 /// Grazing directions say nothing of a surface, degrees.
@@ -44,17 +42,6 @@ impl InPlane {
             ..Observation::backscatter(self.theta_i_rad, Some(sigma0), None)
         }
     }
-
-    /// A detection of a curve as a value; `None` out of the plane of incidence.
-    pub fn of(row: &Observation) -> Option<InPlane> {
-        let aspect = row.aspect();
-        Some(InPlane {
-            theta_i_rad: row.theta_i_rad,
-            theta_s_rad: aspect.theta_s_rad()?,
-            f_per_sr: row.sigma0? / aspect.sigma0_per_f(),
-            sd_db: None,
-        })
-    }
 }
 
 /// Whether the bytes are a `.bsdf` table, by the words that its header has.
@@ -65,16 +52,25 @@ pub fn is_bsdf(bytes: &[u8]) -> bool {
     first_words.any(|first| words.iter().any(|word| word.as_bytes() == first))
 }
 
-/// A row of a table, without the deviation of its level.
+/// A row of a table; a value that is not above zero is that of its blank.
 pub(super) fn read_row(table: &Table, row: usize) -> Result<InPlane, FormatError> {
     let theta_i_deg = table.required_within(row, "theta_i_deg", (0.0, GRAZING_DEG))?;
     let theta_s_deg = table.required_within(row, "theta_s_deg", (-GRAZING_DEG, GRAZING_DEG))?;
     Ok(InPlane {
         theta_i_rad: theta_i_deg.to_radians(),
         theta_s_rad: theta_s_deg.to_radians(),
-        f_per_sr: table.required_within(row, "brdf_per_sr", VALUES_PER_SR)?,
-        sd_db: None,
+        f_per_sr: value_per_sr(table, row)?,
     })
+}
+
+fn value_per_sr(table: &Table, row: usize) -> Result<f64, FormatError> {
+    let value = table.number(row, "brdf_per_sr")?.filter(|value| *value <= 0.0);
+    let Some(cell) = value.and_then(|_| table.cell(row, "brdf_per_sr")) else {
+        return table.required_within(row, "brdf_per_sr", VALUES_PER_SR);
+    };
+    let blank = table.number_within(row, "blank_per_sr", VALUES_PER_SR)?;
+    let way_out = "a value that is not above zero is a limit: give its blank in `blank_per_sr`, or leave the line out";
+    blank.ok_or_else(|| cell.refuse(way_out))
 }
 
 /// Reads the plane of incidence of a `.bsdf` table at its first sample rotation, and what a person should know of it; zeros,
@@ -152,7 +148,6 @@ fn in_plane(theta_i_deg: f64, theta_s_deg: f64, f_per_sr: f64) -> Option<InPlane
         theta_i_rad: theta_i_deg.to_radians(),
         theta_s_rad: theta_s_deg.to_radians(),
         f_per_sr,
-        sd_db: None,
     })
 }
 

@@ -80,8 +80,6 @@ pub struct Points {
     pub rows: Vec<(usize, Observation)>,
     /// Standard deviation of the level of each point, dB, where the file states it.
     pub sd_db: Vec<Option<f64>>,
-    /// Whether the file is a table in the plane of incidence, by its columns or as a `.bsdf`.
-    pub is_in_plane: bool,
     /// How the target was lit and seen, as far as columns state it.
     pub illumination: Illumination,
     /// A sentence on columns of which nothing is read.
@@ -113,7 +111,6 @@ pub fn points(bytes: &[u8], names: &ColumnNames) -> Result<Points, FormatError> 
         return Ok(Points {
             rows: rows.map(|(n, row)| (n + 1, row)).collect(),
             sd_db: vec![None; values.len()],
-            is_in_plane: true,
             notices,
             ..Points::default()
         });
@@ -151,9 +148,8 @@ pub fn points(bytes: &[u8], names: &ColumnNames) -> Result<Points, FormatError> 
             .push(format!("{below} of {all} levels are not above their blank and count as limits"));
     }
     notices.extend(copies(&rows, &sd_db));
-    let is_in_plane = matches!(form, Form::InPlane);
     let illumination = illumination(&table)?;
-    Ok(Points { rows, sd_db, is_in_plane, illumination, passed_over, notices })
+    Ok(Points { rows, sd_db, illumination, passed_over, notices })
 }
 
 /// That the longest run of rows that repeats an earlier one exactly is no chance.
@@ -367,21 +363,35 @@ fn flag(table: &Table, column: &str) -> Result<bool, FormatError> {
 
 /// The angle of incidence of a row, degrees.
 fn theta_i_deg(table: &Table, row: usize, angle: &str) -> Result<f64, FormatError> {
-    let range = if angle == "theta_signed_deg" { (-90.0, 90.0) } else { QUARTER_TURN_DEG };
+    let is_signed = angle == "theta_signed_deg";
+    if !is_signed
+        && let Some(cell) = table.cell(row, angle)
+        && table.number(row, angle)?.is_some_and(|deg| deg < 0.0)
+    {
+        return Err(cell.refuse(
+            "give a value from 0 to 90; angles to both sides of the normal are `theta_signed_deg`",
+        ));
+    }
+    let range = if is_signed { (-90.0, 90.0) } else { QUARTER_TURN_DEG };
     let stated_deg = table.required_within(row, angle, range)?;
     Ok(if angle == "grazing_deg" { 90.0 - stated_deg } else { stated_deg.abs() })
 }
 
-/// The level of a row, dB.
+/// The level of a row, dB; one that is not above zero is that of its blank.
 fn level_db(table: &Table, row: usize, level: &str) -> Result<Option<f64>, FormatError> {
     if level == "sigma0_db" {
         return table.number_within(row, level, LEVELS_DB);
     }
     match (table.number(row, level)?, table.cell(row, level)) {
-        (Some(ratio), Some(cell)) if ratio <= 0.0 => Err(cell.refuse(
-            "a level that is not above zero is a limit: write `left` in `censor`, and the level \
-                             of the noise in `threshold_db`",
-        )),
+        (Some(ratio), Some(cell)) if ratio <= 0.0 => {
+            let blank_db = table.number_within(row, "blank_db", LEVELS_DB)?;
+            blank_db.map(Some).ok_or_else(|| {
+                cell.refuse(
+                    "a level that is not above zero is a limit: give its blank in `blank_db`, or write `left` in `censor`, \
+                     and the level of the noise in `threshold_db`",
+                )
+            })
+        }
         (ratio, _) => Ok(ratio.map(db_from_ratio)),
     }
 }
@@ -478,7 +488,9 @@ fn stated(
         (Censor::None, None, _) => refuse(
             column,
             "the cell is empty",
-            format!("where nothing was detected write `left` in `censor` and {LIMIT}"),
+            format!(
+                "leave the line out, or where nothing was detected write `left` in `censor` and {LIMIT}"
+            ),
         ),
         (Censor::Left | Censor::Right, Some(_), _) => {
             let way_out = format!("leave {column} empty there, or `censor`");
@@ -634,7 +646,6 @@ mod tests {
         let plane = format!("theta_i_deg,theta_s_deg,brdf_per_sr,{columns}\n30,-30,0.1,{cells}\n");
         let retro = format!("theta_deg,sigma0_db,{columns}\n30,-3,{cells}\n");
         let [plane, retro] = [plane, retro].map(|text| points(text.as_bytes(), &ours()).unwrap());
-        assert_eq!((plane.is_in_plane, retro.is_in_plane), (true, false));
         assert_eq!((&plane.sd_db, plane.passed_over), (&retro.sd_db, None));
         let of = |points: &[(usize, Observation)]| Observation { sigma0: None, ..points[0].1 };
         assert_eq!(of(&plane.rows), of(&retro.rows));
@@ -673,6 +684,18 @@ mod tests {
             "theta_i_deg,theta_s_deg,brdf_per_sr,blank_per_sr\n0,0,1,1e-6\n0,60,1e-6,1e-6\n";
         let limit = points(plane.as_bytes(), &ours()).unwrap().rows[1].1.threshold_sigma0.unwrap();
         assert!((limit / (4.0 * PI * 1e-6 * 0.5) - 1.0).abs() < 1e-12);
+        // A reading below zero has no logarithm, and is below its blank all the same.
+        let retro = "theta_deg,sigma0,blank_db\n0,1,-60\n60,-1e-7,-60\n";
+        let plane =
+            "theta_i_deg,theta_s_deg,brdf_per_sr,blank_per_sr\n0,0,1,1e-6\n0,60,-2e-7,1e-6\n";
+        for text in [retro, plane] {
+            let row = points(text.as_bytes(), &ours()).unwrap().rows[1].1;
+            assert!(row.is_censored() && row.threshold_sigma0.unwrap() > 0.0, "{text}");
+        }
+        let plane = "theta_i_deg,theta_s_deg,brdf_per_sr\n0,0,1\n0,60,-2e-7\n";
+        let said = points(plane.as_bytes(), &ours()).unwrap_err().to_string();
+        assert!(said.starts_with("line 3, column brdf_per_sr: `-2e-7` is not accepted"), "{said}");
+        assert!(said.contains("give its blank in `blank_per_sr`, or leave the line out"), "{said}");
         let all = points(b"theta_deg,sigma0_db,blank_db\n10,-20,-10\n", &ours()).unwrap_err();
         assert!(all.to_string().contains("no level is above its blank"), "{all}");
     }

@@ -6,8 +6,7 @@ use crate::brdf::Brdf;
 use crate::diagnose::curve::{CurveDiagnosis, CurveReport, Points, Term, base_law};
 use crate::error::Error;
 use crate::formats::{ColumnNames, FormatError};
-use crate::material::Observation;
-use crate::material::file::in_plane::{InPlane, is_bsdf, read_bsdf};
+use crate::material::file::in_plane::{is_bsdf, read_bsdf};
 use crate::material::file::points;
 use crate::measure::Curve;
 
@@ -57,7 +56,7 @@ impl CurveRequest<'_> {
             read_bsdf(bytes)?;
         }
         let table = points(bytes, self.columns)?;
-        let (sd_db, is_in_plane) = (table.sd_db.clone(), table.is_in_plane);
+        let sd_db = table.sd_db.clone();
         let (curve, mut notices) = Curve::of_points(table)?;
         let stated = curve.observations.iter().zip(&sd_db).filter(|(row, _)| !row.is_censored());
         let stated: Vec<bool> = stated.map(|(_, sd_db)| sd_db.is_some()).collect();
@@ -70,26 +69,10 @@ impl CurveRequest<'_> {
                 "calibrate them, or `matdb fit` the curve: its widths and exponents need no level";
             return Err(FormatError::at("column relative", problem, way_out));
         }
-        if !is_in_plane && curve.observations.iter().all(Observation::is_retro) {
-            return Ok((Points::backscatter(&curve, &sd_db, self.noise_db), notices));
-        }
-        if curve.observations.iter().any(Observation::is_censored) {
-            notices.push("limits are left out in the plane of incidence".to_owned());
-        }
-        Ok((Points::in_plane(&values(&curve, &sd_db)?, self.noise_db), notices))
-    }
-}
-
-/// The detections of a curve as values in the plane of incidence.
-fn values(curve: &Curve, sd_db: &[Option<f64>]) -> Result<Vec<InPlane>, FormatError> {
-    let mut values = Vec::new();
-    let rows = curve.observations.iter().zip(sd_db).enumerate();
-    for (place, (row, sd_db)) in rows.filter(|(_, (row, _))| !row.is_censored()) {
-        let value = InPlane::of(row).ok_or_else(|| {
-            let place = format!("point {} (from 1)", place + 1);
+        let points = Points::of_curve(&curve, &sd_db, self.noise_db).map_err(|row| {
+            let place = format!("point {row} (from 1)");
             FormatError::at(place, "it is out of the plane of incidence", "leave such points out")
         })?;
-        values.push(InPlane { sd_db: *sd_db, ..value });
+        Ok((points, notices))
     }
-    Ok(values)
 }
