@@ -129,6 +129,23 @@ fn a_curve_is_fitted_stored_rendered_and_listed() {
     );
     assert_eq!(csv.lines().count(), 7);
 
+    // Through a beam, too, a level lies within its band.
+    let lit = curve(0.0, 60.0, 400).lines().enumerate().fold(String::new(), |text, (row, line)| {
+        text + line + if row == 0 { ",beam_rad\n" } else { ",0.03\n" }
+    });
+    fs::write(folder.join("lit.csv"), lit).unwrap();
+    let [saved, predict] = [
+        "fit lit.csv --starts 1 --save concrete --kind synthetic --source T --frequency 300",
+        "predict concrete --angles 0:20:2",
+    ];
+    json(folder, &saved.split(' ').collect::<Vec<&str>>());
+    let predicted = json(folder, &predict.split(' ').collect::<Vec<&str>>());
+    for level in predicted["levels"].as_array().unwrap() {
+        let [low_db, high_db] = [0, 1].map(|end| level["band_db"][end].as_f64().unwrap());
+        let sigma0_db = level["sigma0_db"].as_f64().unwrap();
+        assert!((low_db..high_db).contains(&sigma0_db), "{level}");
+    }
+
     json(folder, &["render", scene("human.toml").to_str().unwrap(), "-o", "out"]);
     let record: Value =
         serde_json::from_slice(&fs::read(folder.join("out/scan.json")).unwrap()).unwrap();

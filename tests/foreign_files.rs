@@ -107,6 +107,20 @@ fn three_steps_lead_from_a_foreign_cloud_to_a_curve() {
     assert!(made.contains("beside the mesh"), "the ball of a metre stands at the origin: {made}");
     let again = refused(at, &new);
     assert!(again.contains("scene.toml exists already"), "{again}");
+    // Chirps that only some points number keep their numbers, and the others get free ones.
+    let mut some = "X,Y,Z,Intensity,chirp\n".to_owned();
+    for (row, [x, y, z, level, _]) in points.iter().enumerate() {
+        let chirp = if row % 3 == 0 { (row + 7).to_string() } else { String::new() };
+        some += &format!("{x},{y},{z},{level},{chirp}\n");
+    }
+    fs::write(at.join("some.csv"), some).unwrap();
+    let numbered = said(at, &(new.replace("scan.xyz", "some.csv") + " -o some.toml"));
+    assert!(numbered.contains("wrote some.toml"), "{numbered}");
+    let rays = fs::read_to_string(at.join("some-rays.csv")).unwrap();
+    let numbers: Vec<u32> =
+        rays.lines().skip(1).map(|line| line.split(',').next().unwrap().parse().unwrap()).collect();
+    let distinct: std::collections::HashSet<&u32> = numbers.iter().collect();
+    assert_eq!((distinct.len(), numbers[3]), (points.len(), 10));
     // What a person changes: size and place of the ball, the beam, and that rays are single.
     let scene = fs::read_to_string(at.join("scene.toml")).unwrap();
     assert!(
@@ -124,6 +138,15 @@ fn three_steps_lead_from_a_foreign_cloud_to_a_curve() {
         &format!("measure scan.xyz {columns} --scene scene.toml --exact-mesh -o measured"),
     );
     assert!(measured.contains("and 0 censored chirps"), "{measured}");
+    // A radar that stood elsewhere: its rays meet hardly a point.
+    let elsewhere = SCENE.replace("position_m = [0.4, 1.3, 3.0]", "position_m = [2.4, 1.3, 3.0]");
+    fs::write(at.join("elsewhere.toml"), elsewhere).unwrap();
+    let off = format!(
+        "measure scan.xyz {columns} --scene elsewhere.toml --pose 0,0,0 --keep-pose -o off"
+    );
+    let off = refused(at, &off);
+    assert!(off.contains("points lie on no ray of the scan: is the radar's place right"), "{off}");
+    assert!(!at.join("off").exists());
     let curve = fs::read_to_string(at.join("measured/curve.csv")).unwrap();
     assert!(
         curve.starts_with("theta_deg,")
@@ -256,6 +279,7 @@ fn clouds_that_say_too_little_or_too_much_are_refused_with_the_way_out() {
         ("f.csv", "x,y,z,power\n1,2,3,\n", "", "line 2, column power: the cell is empty"),
         ("g.xyz", "1 2 3 4 5\n", "", "it has: 1, 2, 3, 4, 5"),
         ("h.las", "LASF", "", "the file: "),
+        ("i.xyz", "1 2 3 0\n1 2 4 0\n", "", "all 2 powers are 0: the file has none"),
         ("i.pcd", "VERSION 0.7\n", "", "there is no line DATA"),
         ("j.xyz", "1 2 3 0\n", " --power counts", "point 0 has 0 counts"),
         ("k.abc", "", "", ".ply, .csv, .xyz"),

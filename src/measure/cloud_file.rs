@@ -343,6 +343,8 @@ mod tests {
         let with_zero = metres().read(PointFormat::Xyz, b"0 0 0 0\n1 0 0 1e-6").unwrap_err();
         assert!(matches!(with_zero, CloudError::Watts { .. }), "{with_zero}");
         assert!(metres().read(PointFormat::Xyz, b"0 0 0 -60\n1 0 0 1e-6").is_ok());
+        let none = metres().read(PointFormat::Xyz, b"0 0 0 0\n1 0 0 0").unwrap_err();
+        assert_eq!(none, CloudError::NoPowers { points: 2 });
         let negative = watts.read(PointFormat::Xyz, b"0 0 0 -60").unwrap_err();
         assert_eq!(negative, CloudError::NotPositive { point: 0, power_w: -60.0 });
     }
@@ -434,6 +436,18 @@ mod tests {
         let named = ply("x y z power_dbm", "0 0 0 -60");
         let told = CloudReading { power: PowerUnit::RelativeDb, ..metres() };
         assert_eq!(told.read(PointFormat::Ply, &named).unwrap().scale, Scale::Relative);
+        let watts = ply("x y z power_w", "0 0 0 1e-9\n0 0 1 2e-9");
+        assert_eq!(told.read(PointFormat::Ply, &watts).unwrap().scale, Scale::Relative);
+        // Squares of 16 bits, and decibels over one count.
+        for (power, text) in [
+            (PowerUnit::Counts, "0 0 0 4294836225\n1 0 0 4294836.225\n"),
+            (PowerUnit::RelativeDb, "0 0 0 96\n1 0 0 66\n"),
+        ] {
+            let reading = CloudReading { power, ..metres() };
+            let cloud = reading.read(PointFormat::Xyz, text.as_bytes()).unwrap();
+            let [first, second] = [0, 1].map(|row| cloud.points()[row].power_w);
+            assert!((first / second - 1000.0).abs() < 1e-6, "{text}");
+        }
         let none = CloudReading { power: PowerUnit::Counts, ..metres() };
         let none = none.read(PointFormat::Xyz, b"0 0 0 0\n").unwrap_err().to_string();
         assert!(none.contains("point 0 has 0 counts"), "{none}");

@@ -89,12 +89,14 @@ pub enum RegistrationError {
 /// Why a reduction fails.
 #[derive(Debug, Error, PartialEq)]
 pub enum ReductionError {
-    /// No point lies on a ray of the scan.
+    /// Most points lie on no ray of the scan.
     #[error(
-        "none of the {points} points lies on a ray of the scan: is the radar's place right, and is this its scan? `matdb new scene \
+        "{off} of {points} points lie on no ray of the scan: is the radar's place right, and is this its scan? `matdb new scene \
          --cloud` writes a scene with the rays of a cloud"
     )]
     OffRays {
+        /// Points on no ray.
+        off: usize,
         /// Number of points.
         points: usize,
     },

@@ -381,11 +381,11 @@ impl Assignment<'_> {
         Assignment { chirp_of_point, unmatched, silent, only_detected, notices }
     }
 
-    /// Refuses a cloud of which no point lies on a ray, and one whose points share their chirps.
+    /// Refuses a cloud of which most points lie on no ray, and one whose points share their chirps.
     fn check(&self) -> Result<(), ReductionError> {
         let points = self.chirp_of_point.len();
-        if self.unmatched == points {
-            return Err(ReductionError::OffRays { points });
+        if 2 * self.unmatched > points {
+            return Err(ReductionError::OffRays { off: self.unmatched, points });
         }
         let chirps: HashSet<u32> = self.chirp_of_point.iter().copied().collect();
         let shared = points - chirps.len();
