@@ -36,16 +36,30 @@ def read(path):
                     f"{path}: {name}: its description {str(words)!r} names no sample with a reference; measure the empty path, "
                     "and write dsDescription as 'ds1:Sample, ds2:Ref'"
                 )
+            missing = [key for key in (sample, reference) if key not in group]
+            if missing:
+                raise SystemExit(f"{path}: {name}: there is no trace {missing[0]}, which its description names; check the export")
             runs.append([trace(path, name, group[key][()]) for key in (sample, reference)])
             if "hickness" in str(np.ravel(group.attrs.get("mdDescription", [""]))[0]):
-                thicknesses.append(1e-3 * float(np.ravel(group.attrs["md1"])[0]))
+                thicknesses.append(stated_mm(path, name, group.attrs.get("md1")))
     if not runs:
         raise SystemExit(f"{path}: there is no measurement in it; check the export")
     return runs, thicknesses
 
 
+def stated_mm(path, name, value):
+    try:
+        found = float(np.ravel(value)[0])
+    except (TypeError, ValueError):
+        found = float("nan")
+    if not found > 0:
+        raise SystemExit(f"{path}: {name}: md1 states no thickness above 0, in mm; give --thickness-mm")
+    return 1e-3 * found
+
+
 def trace(path, name, table):
-    table = table if table.shape[1] == 2 else table.T
+    if table.ndim == 2 and table.shape[1] != 2:
+        table = table.T
     if table.ndim != 2 or table.shape[1] != 2 or len(table) < 100 or not np.isfinite(table).all():
         raise SystemExit(f"{path}: {name}: a trace is no table of times and signals; check the export")
     return table * [1e-12, 1.0]
@@ -140,8 +154,11 @@ def main():
     parser.add_argument("--thickness-sd-mm", type=float, help="its standard deviation [default: from the echoes in the sheet]")
     arguments = parser.parse_args()
     runs, thicknesses = read(arguments.file)
-    if arguments.thickness_mm:
-        thicknesses = [1e-3 * arguments.thickness_mm]
+    if arguments.thickness_mm is not None:
+        thicknesses = [stated_mm(arguments.file, "--thickness-mm", arguments.thickness_mm)]
+    if thicknesses and np.ptp(thicknesses) > 0.02 * np.mean(thicknesses):
+        stated = ", ".join(f"{1e3 * one:.4g}" for one in thicknesses)
+        raise SystemExit(f"{arguments.file}: its measurements are of sheets of {stated} mm; give one sheet, or --thickness-mm")
     if not thicknesses:
         raise SystemExit(f"{arguments.file}: it does not state the thickness; give --thickness-mm")
     sd = arguments.thickness_sd_mm and 1e-3 * arguments.thickness_sd_mm
@@ -151,9 +168,12 @@ def main():
     rows = [result.at(f) for f in wanted]
     if not rows:
         raise SystemExit(f"{arguments.file}: no frequency is above the noise by enough; average more traces")
+    echoes = "the echoes in the sheet show none within 15 %"
+    if np.isfinite(result.echo_thickness):
+        echoes = f"the echoes in the sheet alone say {1e3 * result.echo_thickness:.3f} mm"
     for_people = (
         f"{len(runs)} measurements; thickness {1e3 * result.thickness[0]:.3f} +- {1e3 * result.thickness[1]:.3f} mm "
-        f"({result.thickness_from}; the echoes in the sheet alone say {1e3 * result.echo_thickness:.3f} mm); "
+        f"({result.thickness_from}; {echoes}); "
         f"useful from {result.f[0] / 1e9:.0f} to {result.f[-1] / 1e9:.0f} GHz"
     )
     os.makedirs(arguments.out, exist_ok=True)

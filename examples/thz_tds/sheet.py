@@ -114,14 +114,14 @@ def waviness(n, f):
 
 
 def echo_thickness(transmitted, f, stated):
-    """The thickness at which the index swings least, within 15 % of the stated one, m."""
+    """The thickness at which the index swings least, m; NaN where that is not within 15 % of the stated one."""
     trials = stated * np.linspace(0.85, 1.15, 61)
     swings = [waviness(index(transmitted, f, d), f) for d in trials]
     best = int(np.argmin(swings))
     if 0 < best < len(trials) - 1:
         a, b, c = swings[best - 1 : best + 2]
         return trials[best] + 0.5 * (trials[1] - trials[0]) * (a - c) / (a - 2 * b + c)
-    return trials[best]
+    return float("nan")
 
 
 def evaluate(runs, stated, stated_sd=None):
@@ -143,6 +143,11 @@ def evaluate(runs, stated, stated_sd=None):
     even = (f > 0.15e12) & (f < 1.0e12)
     even = even if even.sum() > 20 else np.ones(len(f), bool)
     echoes = float(np.mean([echo_thickness(one[even], f[even], stated) for one in transmitted]))
+    if not stated_sd and not np.isfinite(echoes):
+        raise SystemExit(
+            f"the echoes in the sheet show no thickness within 15 % of {1e3 * stated:.4g} mm: check its value and unit, or give its error by "
+            "--thickness-sd-mm"
+        )
     thickness_sd = stated_sd or max(abs(echoes - stated), 0.01 * stated)
     each = np.array([index(one, f, stated) for one in transmitted])
     n = each.mean(axis=0)

@@ -175,7 +175,7 @@ fn text(args: &Args, measured: &MeasurementReport, stored: Option<&StoredMeasure
     let held = if free.is_empty() {
         String::new()
     } else {
-        format!("the points do not tell: {}\n", free.join("; "))
+        format!("the points do not determine: {}\n", free.join("; "))
     };
     let kept = if args.keep_pose {
         "the given pose is kept\n"
@@ -184,12 +184,18 @@ fn text(args: &Args, measured: &MeasurementReport, stored: Option<&StoredMeasure
     } else {
         ""
     };
+    let known = if args.keep_pose {
+        String::new()
+    } else {
+        let (shift_sd_mm, turn_sd_deg) = (1e3 * shift_sd_m, turn_sd_rad.to_degrees());
+        format!(", known to {shift_sd_mm:.2} mm and {turn_sd_deg:.3}° (1 sd)")
+    };
     let saved =
         stored.map_or(String::new(), |StoredMeasurement { material, revision, curve, .. }| {
             format!("stored the curve as `{curve}` in {material}@{revision}\n")
         });
     format!(
-        "{kept}{held}pose: {} of {} points on the surface, rms {:.2} mm, known to {:.2} mm and {:.3}° (1 sd)\n\
+        "{kept}{held}pose: {} of {} points on the surface, rms {:.2} mm{known}\n\
          shift of the middle of the points: {:.2}, {:.2}, {:.2} mm\n\
          curve: {} detections and {} censored chirps from {:.1}° to {:.1}°\n\
          reduced with {}; {}\n\
@@ -198,8 +204,6 @@ fn text(args: &Args, measured: &MeasurementReport, stored: Option<&StoredMeasure
         grouped(registered.inliers),
         grouped(registered.points),
         1e3 * registered.rms_m,
-        1e3 * shift_sd_m,
-        turn_sd_rad.to_degrees(),
         shift_mm.x,
         shift_mm.y,
         shift_mm.z,

@@ -196,7 +196,11 @@ impl fmt::Display for Finding {
                 write!(f, "{name} stopped at its bound {}", significant(*value, 5))
             }
             Finding::OnlyTogether { names } => {
-                write!(f, "{} act only together: the data tell their combination", listed(names))
+                write!(
+                    f,
+                    "{} act only together: the data determine their combination",
+                    listed(names)
+                )
             }
             Finding::Unconstrained { name } => write!(f, "the data say nothing of {name}"),
             Finding::HardToTellApart { names: [a, b], correlation } => {

@@ -64,6 +64,10 @@ impl ColumnNames {
                 return Err(FormatError::at("the columns", problem, "give it one"));
             }
             let named: Vec<usize> = (0..given.len()).filter(|&at| given[at] == *theirs).collect();
+            if ours == PASSED_OVER && !named.is_empty() {
+                named.iter().for_each(|&at| columns[at].clear());
+                continue;
+            }
             let &[only] = named.as_slice() else {
                 let problem = match named.len() {
                     0 => format!("there is no column `{theirs}`"),
@@ -71,7 +75,7 @@ impl ColumnNames {
                 };
                 return Err(FormatError::at("the columns", problem, among(&given, theirs)));
             };
-            columns[only] = if ours == PASSED_OVER { String::new() } else { ours.clone() };
+            columns[only] = ours.clone();
         }
         Ok(())
     }

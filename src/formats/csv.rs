@@ -79,6 +79,9 @@ impl Table {
     /// # Errors
     /// The line that is not like the header.
     pub fn parse(bytes: &[u8], names: Names) -> Result<Table, FormatError> {
+        if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
+            return Err(FormatError::at("the file", "the text is UTF-16", "save it as UTF-8"));
+        }
         let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
         let head = head(bytes);
         let bytes = without_head(bytes);
@@ -137,7 +140,7 @@ impl Table {
             return Ok(());
         };
         let way_out = format!(
-            "the columns are {}; give another its name by --columns THEIRS=OURS",
+            "the columns are {}; give another its name by --columns THEIRS=OURS, or pass it over by --columns THEIRS=-",
             self.columns.join(", ")
         );
         Err(FormatError::at("the header", problem, way_out))

@@ -81,8 +81,7 @@ impl Illumination {
     /// The columns of a CSV in which it is stated: what to add to its header, and to every row.
     pub fn columns(&self) -> [String; 2] {
         let footprint = self.footprint.map(|footprint| footprint.as_str().to_owned());
-        // A thousandth of the narrowest beam of a radar.
-        let beam = self.beam_rad.map(|beam_rad| format!("{beam_rad:.6}"));
+        let beam = self.beam_rad.map(|beam_rad| beam_rad.to_string());
         let mut columns = [String::new(), String::new()];
         let [relative, only_detected] =
             [self.relative, self.only_detected].map(|on| on.then(|| "1".to_owned()));

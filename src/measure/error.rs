@@ -9,6 +9,17 @@ use crate::units::{dbm_from_watts, rounded};
 /// Why a registration fails.
 #[derive(Debug, Error, PartialEq)]
 pub enum RegistrationError {
+    /// A point of a chirp that the scan does not have.
+    #[error(
+        "point {point} is of chirp {chirp}, which the scan does not have; give the scan of the measurement, or leave the column of the \
+         chirps out"
+    )]
+    NoSuchChirp {
+        /// Point, from 0.
+        point: usize,
+        /// Its chirp.
+        chirp: u32,
+    },
     /// Too few points.
     #[error("the cloud has {points} points, a pose needs {least}; measure with more chirps")]
     TooFew {

@@ -191,7 +191,12 @@ fn check_chirps(
 ) -> Result<(), RegistrationError> {
     let near_m = 0.5 * radar.spot_fwhm_m();
     let (mut numbered, mut near) = (0, 0);
-    for (CloudPoint { chirp, point, .. }, index) in std::iter::zip(cloud.points(), indices) {
+    for (number, (CloudPoint { chirp, point, .. }, index)) in
+        std::iter::zip(cloud.points(), indices).enumerate()
+    {
+        if let (Some(chirp), None) = (*chirp, *index) {
+            return Err(RegistrationError::NoSuchChirp { point: number, chirp });
+        }
         numbered += usize::from(chirp.is_some());
         let ray = index.filter(|_| chirp.is_some()).map(|index| &chirps.rays[index]);
         near += usize::from(ray.is_some_and(|ray| distance_m(ray, *point) <= near_m));

@@ -25,7 +25,7 @@ use crate::frames::{Global, Point, Pose, Ray, Target as TargetFrame};
 use crate::material::{Illumination, Observation, Scale};
 use crate::radar::{Chirps, Footprint, Link, Radar};
 use crate::scene::Target;
-use crate::units::watts_from_dbm;
+use crate::units::{rounded, watts_from_dbm};
 
 /// Settings of the reduction of a registered cloud to a curve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -164,7 +164,10 @@ impl Reduction {
 
     /// The divergence of the beam that the lobes of the curve include, rad.
     fn beam_rad(&self, widening: &CurveWidening) -> f64 {
-        if self.of_spots { widening.curved_rad } else { widening.flat_rad }
+        /// A thousandth of the narrowest beam of a radar, rad.
+        const STEP_RAD: f64 = 1e-6;
+        let beam_rad = if self.of_spots { widening.curved_rad } else { widening.flat_rad };
+        rounded((beam_rad / STEP_RAD).round().max(1.0) * STEP_RAD)
     }
 
     /// A sentence on a target that is curved within the spot.
@@ -396,10 +399,11 @@ impl Assignment<'_> {
     }
 }
 
-/// Counts levels of an unknown unit from the strongest of them.
+/// Counts levels of an unknown unit from the strongest of them; their powers are no watts.
 fn from_strongest(observations: &mut [Observation]) {
     let strongest = observations.iter().filter_map(|row| row.sigma0).fold(0.0, f64::max);
     for row in observations.iter_mut().filter(|_| strongest > 0.0) {
+        row.power_w = None;
         for level in [&mut row.sigma0, &mut row.threshold_sigma0].into_iter().flatten() {
             *level /= strongest;
         }

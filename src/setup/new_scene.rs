@@ -48,6 +48,8 @@ pub struct MadeScene {
 
 /// Ranges and distances that differ by more are of another place, m.
 const MISMATCH_M: f64 = 0.02;
+/// A scatter of ranges that the user should know of, m: a radar of the preset's bandwidth has a third of it.
+const SCATTERED_M: f64 = 0.005;
 /// Farther apart, cloud and mesh need a rough pose, m: what a registration follows.
 const FAR_M: f64 = 0.2;
 
@@ -58,7 +60,7 @@ impl NewScene<'_> {
     /// A place of the radar that is not known or contradicts the ranges; a mesh that cannot be read; a frequency that no
     /// radar has.
     pub fn make(&self) -> Result<MadeScene, Error> {
-        let (radar_at, how) = self.place()?;
+        let (radar_at, how, scattered) = self.place()?;
         let points: Vec<DVec3> = self.cloud.points().iter().map(|p| p.point.xyz).collect();
         let middle = Point::from(median_point(&points));
         let look_at = self.look_at.unwrap_or(middle);
@@ -70,18 +72,26 @@ impl NewScene<'_> {
         let files = vec![(name, text.into_bytes()), (rays_name, rays.into_bytes())];
         let scene = self.load(&files)?;
         let far = far_away(radar_at.distance_m(middle));
-        let notices = far.into_iter().chain(off_the_mesh(&scene, middle)).collect();
+        let notices = [scattered, far].into_iter().flatten();
+        let notices = notices.chain(off_the_mesh(&scene, middle)).collect();
         Ok(MadeScene { files, radar_at, how, notices })
     }
 
-    /// Where the radar stood, and how that is known.
-    fn place(&self) -> Result<(Point<Global>, String), Error> {
+    /// Where the radar stood, how that is known, and what makes it doubtful.
+    fn place(&self) -> Result<(Point<Global>, String, Option<String>), Error> {
         let cloud = self.cloud_file.display();
         let Some(at) = self.radar_at else {
             return match radar_place(self.cloud) {
                 Ok(place) => {
                     let rms_mm = significant(1e3 * place.rms_m, 2);
-                    Ok((place.position, format!("found from the ranges, {rms_mm} mm rms")))
+                    let scattered = (place.rms_m > SCATTERED_M).then(|| {
+                        format!(
+                            "the ranges scatter by {rms_mm} mm about the distances to that place: if the radar is more precise, they \
+                             are not one-way ranges in metres, or of another place; --radar-at states it"
+                        )
+                    });
+                    let how = format!("found from the ranges, {rms_mm} mm rms");
+                    Ok((place.position, how, scattered))
                 }
                 Err(error) => Err(Error::usage(
                     format!("{cloud}: {error}"),
@@ -104,7 +114,7 @@ impl NewScene<'_> {
                 ),
                 "check both, or leave --radar-at out to find the place from the ranges",
             )),
-            _ => Ok((at, "as given".to_owned())),
+            _ => Ok((at, "as given".to_owned(), None)),
         }
     }
 

@@ -19,7 +19,7 @@ use crate::material::{
     Citation, Curve, Illumination, Instrument, Material, Observation, Slug, Source, SourceKind,
     Status, file,
 };
-use crate::units::{db_from_ratio, dbm_from_watts, shown};
+use crate::units::{db_from_ratio, dbm_from_watts, ratio_from_db, shown};
 
 /// Key of the instrument that a curve was measured with.
 pub(super) const RADAR: &str = "radar";
@@ -27,8 +27,11 @@ pub(super) const RADAR: &str = "radar";
 /// Writes the curve, or what the model says at every degree.
 pub(super) fn write(subject: &Subject, name: &str) -> Export {
     let points = subject.points();
-    let mut text: String = subject.about().iter().map(|line| format!("# {line}\n")).collect();
-    text += &format!("# {}, at {} GHz\n", describe(&points), points.frequency_hz / 1e9);
+    let mut about = subject.about();
+    about.push(format!("{}, at {} GHz", describe(&points), points.frequency_hz / 1e9));
+    // A name may hold any character, a comment no end of a line.
+    let about = about.iter().map(|line| line.replace(char::is_control, " "));
+    let mut text: String = about.map(|line| format!("# {line}\n")).collect();
     let lit = points.curve.map(|curve| curve.illumination).unwrap_or_default();
     let [names, lit] = lit.columns();
     let observations = match points.curve {
@@ -79,9 +82,16 @@ const DETAILS: [Detailed; 6] = [
     Detailed { column: "yt_m", of: |point| point.target_m.map(|[_, y]| y) },
 ];
 
-/// A level in dB; nothing where there is none.
+/// A level in dB, with the decimals that somebody wrote where these read back as the same ratio; nothing where there is none.
 fn level_db(level: Option<f64>) -> String {
-    level.map(|ratio| fifteen_digits(db_from_ratio(ratio))).unwrap_or_default()
+    let Some(ratio) = level else { return String::new() };
+    let level_db = db_from_ratio(ratio);
+    let written_db = (1e9 * level_db).round() / 1e9;
+    if ratio_from_db(written_db) == ratio {
+        shown(written_db + 0.0)
+    } else {
+        fifteen_digits(level_db)
+    }
 }
 
 /// Fifteen digits, as many as decimals that somebody wrote keep on their way through radians and ratios.

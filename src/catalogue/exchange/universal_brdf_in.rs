@@ -63,8 +63,12 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Details) -> Result<Material
         ..Instrument::default()
     });
     // Another program's f is stated as f, without the form in which it was reduced.
-    let illumination: Option<Illumination> =
-        serde_json::from_value(ours["illumination"].clone()).ok().flatten();
+    let illumination: Option<Illumination> = serde_json::from_value(ours["illumination"].clone())
+        .map_err(|error| {
+        let place = format!("metadata.adhoc_section.{OURS}.illumination");
+        let problem = format!("it cannot be read: {error}");
+        ExchangeError::in_file(file, FormatError::at(place, problem, "correct or remove it"))
+    })?;
     let single = SingleCurve {
         slug,
         class,

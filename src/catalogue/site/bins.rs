@@ -49,7 +49,7 @@ fn median(points: &[&Observation]) -> String {
     match statistics::median(points.iter().copied()) {
         Median::At(sigma0) => decibels(db_from_ratio(sigma0)),
         Median::Below(sigma0) => format!("< {}", decibels(db_from_ratio(sigma0))),
-        Median::Unknown => "not told".to_owned(),
+        Median::Unknown => "not known".to_owned(),
     }
 }
 

@@ -68,7 +68,7 @@ pub fn report(report: &FitReport) -> String {
         report.version
     );
     match report.verdict.as_slice() {
-        [] => text += "verdict: the data tell every number above\n",
+        [] => text += "verdict: the data determine every number above\n",
         sentences => {
             text += "verdict:\n";
             sentences.iter().for_each(|sentence| text += &format!("- {sentence}\n"));
@@ -78,7 +78,7 @@ pub fn report(report: &FitReport) -> String {
 }
 
 fn estimates(report: &FitReport) -> String {
-    const UNKNOWN: &str = "not told";
+    const UNKNOWN: &str = "not known";
     table(
         &["estimate", "value", "± sd", "95 % interval"],
         report.estimates.iter().map(|e| {

@@ -223,10 +223,17 @@ fn numbers(table: ply::Table) -> Numbers {
 
 /// Text whose header may be missing.
 fn text(bytes: &[u8]) -> Result<csv::Table, FormatError> {
-    let mut table = if begins_with_a_count(bytes) {
-        csv::Table::parse(&[b"#", bytes].concat(), Names::WhereTheyAre)?
-    } else {
-        csv::Table::parse(bytes, Names::WhereTheyAre)?
+    let mut table = match count_at_the_head(bytes) {
+        None => csv::Table::parse(bytes, Names::WhereTheyAre)?,
+        Some(count) => {
+            let table = csv::Table::parse(&[b"#", bytes].concat(), Names::WhereTheyAre)?;
+            if table.len() as u64 != count {
+                let problem = format!("it states {count} points, and {} follow", table.len());
+                let way_out = "give the whole file, or remove the line";
+                return Err(FormatError::at("line 1", problem, way_out));
+            }
+            table
+        }
     };
     let names = match table.columns().collect::<Vec<_>>()[..] {
         ["1", "2", "3"] => "1=x,2=y,3=z",
@@ -237,14 +244,17 @@ fn text(bytes: &[u8]) -> Result<csv::Table, FormatError> {
     Ok(table)
 }
 
-/// Whether the first line is the number of points, as scanners write it in a `.pts`, and the second has more than that.
-fn begins_with_a_count(bytes: &[u8]) -> bool {
+/// The first line, if it is the number of points, as scanners write it in a `.pts`, and the second has more than that.
+fn count_at_the_head(bytes: &[u8]) -> Option<u64> {
     let mut lines = bytes.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii);
-    lines.next().is_some_and(is_count) && lines.next().is_some_and(|line| !is_count(line))
+    let count = count(lines.next()?)?;
+    lines.next().filter(|line| self::count(line).is_none()).map(|_| count)
 }
 
-fn is_count(line: &[u8]) -> bool {
-    (1..20).contains(&line.len()) && line.iter().all(u8::is_ascii_digit)
+fn count(line: &[u8]) -> Option<u64> {
+    let digits =
+        std::str::from_utf8(line).ok().filter(|text| text.bytes().all(|b| b.is_ascii_digit()));
+    digits?.parse().ok()
 }
 
 #[cfg(test)]
@@ -293,6 +303,8 @@ mod tests {
         let counted = read(PointFormat::Xyz, b"2\r\n0 1 2 -60\r\n3 4 5 -61\r\n");
         assert_eq!(counted.column("power"), Ok(Some(vec![-60.0, -61.0])));
         assert_eq!(counted.place(1), "line 3");
+        let cut = PointTable::read(PointFormat::Xyz, b"3\n0 1 2 -60\n3 4 5 -61\n").unwrap_err();
+        assert!(cut.to_string().starts_with("line 1: it states 3 points, and 2 follow"), "{cut}");
     }
 
     #[test]

@@ -228,7 +228,7 @@ impl Header {
         if let Some(value) =
             row.iter().find(|value| **value > 0.0 && !(least..=greatest).contains(value))
         {
-            let problem = format!("`{value:e}` is no value of f in 1/sr");
+            let problem = format!("`{value:e}` cannot be f in 1/sr");
             return Err(FormatError::at(format!("line {line}"), problem, "correct the line"));
         }
         Ok(row)

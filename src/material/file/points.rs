@@ -61,6 +61,8 @@ const TURN_DEG: (f64, f64) = (-360.0, 360.0);
 const DEVIATIONS_DB: (f64, f64) = (1e-6, 100.0);
 /// Levels that are no slip, dB.
 const LEVELS_DB: (f64, f64) = (-300.0, 300.0);
+/// The same as ratios.
+const RATIOS: (f64, f64) = (1e-30, 1e30);
 /// Powers that are no slip, dBm.
 const POWERS_DBM: (f64, f64) = (-400.0, 400.0);
 /// Difference of two limits that is rounding, dB.
@@ -288,6 +290,9 @@ impl Form {
 fn the_one(table: &Table, names: &[&'static str]) -> Result<&'static str, FormatError> {
     let there: Vec<&'static str> = names.iter().copied().filter(|name| table.has(name)).collect();
     match there[..] {
+        [] if table.columns().next().is_none() => {
+            Err(FormatError::at("the file", "it is empty", "give the curve's table"))
+        }
         [] => Err(FormatError::at(
             "the header",
             format!("there is no column `{}`", names[0]),
@@ -392,7 +397,7 @@ fn level_db(table: &Table, row: usize, level: &str) -> Result<Option<f64>, Forma
                 )
             })
         }
-        (ratio, _) => Ok(ratio.map(db_from_ratio)),
+        _ => Ok(table.number_within(row, level, RATIOS)?.map(db_from_ratio)),
     }
 }
 
@@ -633,6 +638,12 @@ mod tests {
             assert!((found.theta_i_rad - usual.theta_i_rad).abs() < 1e-15, "{text}");
             assert!((found.sigma0.unwrap() - 0.1).abs() < 1e-15, "{text}");
         }
+        let said = |text: &str| points(text.as_bytes(), &ours()).unwrap_err().to_string();
+        let negative = said("theta_deg,sigma0_db\n-30,-10\n");
+        assert!(negative.contains("angles to both sides of the normal are `theta_signed_deg`"));
+        let small = said("theta_deg,sigma0\n30,1e-310\n");
+        assert!(small.contains("give a value from 1e-30 to 1e30"), "{small}");
+        assert!(said("").starts_with("the file: it is empty"), "{}", said(""));
         let names: ColumnNames = "inc=theta_deg,NRCS=sigma0".parse().unwrap();
         let theirs = points(b"inc,NRCS,comment\n30,0.1,7\n", &names).unwrap();
         assert_eq!(theirs.passed_over.unwrap(), "these columns are passed over: comment");

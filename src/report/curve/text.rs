@@ -45,7 +45,7 @@ pub(super) fn sentence(report: &CurveReport) -> String {
         ),
         CurveVerdict::Explained => {
             let law = if report.base.law == "declared" { "the law" } else { report.base.law };
-            format!("{law} lacks {names}; with that, what is left is noise")
+            format!("{law} lacks {names}; with that, only noise is left")
         }
         CurveVerdict::Unexplained if report.laws.len() > 1 => {
             "the law does not explain the curve, and neither another law nor an effect that was tried \
