@@ -66,12 +66,34 @@ def check_built_in(folder):
     print(f"pvdf: {len(stated)} frequencies are as its traces say")
 
 
+def refused(work, says):
+    try:
+        work()
+    except SystemExit as error:
+        assert says in str(error), f"{error}"
+        return
+    raise AssertionError(f"not refused: {says}")
+
+
+def check_refusals():
+    """What states a wrong thickness, or none, or is no trace, gets no constants."""
+    rng = np.random.default_rng(1)
+    made = runs(rng, lambda f: 1.6 - 0.01j + 0 * f, 0.6e-3)
+    refused(lambda: sheet.evaluate(made, 1.2e-3), "no thickness within 15 % of 1.2 mm")
+    for value in (None, "0,6 mm", -0.6, float("nan")):
+        refused(lambda value=value: evaluate.metres("md1", value), "md1 is ")
+    for table in (np.zeros(400), np.zeros((50, 2)), np.full((400, 2), np.nan)):
+        refused(lambda table=table: evaluate.trace("a.thz", "1", table), "a trace is no table of times and signals")
+    print("what states no thickness, or a wrong one, is refused")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sheets", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
     check_built_in(os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../materials/pvdf"))
+    check_refusals()
     held = {"n": [0, 0], "k": [0, 0]}
     exact = 0.0
     for number in range(arguments.sheets):

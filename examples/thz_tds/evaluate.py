@@ -14,11 +14,12 @@ import numpy as np
 import sheet
 
 
-def read(path):
-    """Traces of the sheet and of the empty path, s and arbitrary units, of each measurement, and thicknesses, m."""
+def read(path, given_mm=None):
+    """Traces of the sheet and of the empty path, s and arbitrary units, of each measurement, and thicknesses, m: those of the
+    file, or the one that is given."""
     import h5py
 
-    runs, thicknesses = [], []
+    runs, thicknesses = [], [] if given_mm is None else [metres("--thickness-mm", given_mm)]
     try:
         file = h5py.File(path)
     except OSError as error:
@@ -40,21 +41,21 @@ def read(path):
             if missing:
                 raise SystemExit(f"{path}: {name}: there is no trace {missing[0]}, which its description names; check the export")
             runs.append([trace(path, name, group[key][()]) for key in (sample, reference)])
-            if "hickness" in str(np.ravel(group.attrs.get("mdDescription", [""]))[0]):
-                thicknesses.append(stated_mm(path, name, group.attrs.get("md1")))
+            if given_mm is None and "hickness" in str(np.ravel(group.attrs.get("mdDescription", [""]))[0]):
+                thicknesses.append(metres(f"{path}: {name}: md1", group.attrs.get("md1")))
     if not runs:
         raise SystemExit(f"{path}: there is no measurement in it; check the export")
     return runs, thicknesses
 
 
-def stated_mm(path, name, value):
+def metres(what, value_mm):
     try:
-        found = float(np.ravel(value)[0])
+        found_mm = float(np.ravel(value_mm)[0])
     except (TypeError, ValueError):
-        found = float("nan")
-    if not found > 0:
-        raise SystemExit(f"{path}: {name}: md1 states no thickness above 0, in mm; give --thickness-mm")
-    return 1e-3 * found
+        found_mm = float("nan")
+    if not found_mm > 0:
+        raise SystemExit(f"{what} is {value_mm}, and a thickness is above 0, in mm; give it by --thickness-mm")
+    return 1e-3 * found_mm
 
 
 def trace(path, name, table):
@@ -153,9 +154,7 @@ def main():
     parser.add_argument("--thickness-mm", type=float, help="thickness [default: that of the file]")
     parser.add_argument("--thickness-sd-mm", type=float, help="its standard deviation [default: from the echoes in the sheet]")
     arguments = parser.parse_args()
-    runs, thicknesses = read(arguments.file)
-    if arguments.thickness_mm is not None:
-        thicknesses = [stated_mm(arguments.file, "--thickness-mm", arguments.thickness_mm)]
+    runs, thicknesses = read(arguments.file, arguments.thickness_mm)
     if thicknesses and np.ptp(thicknesses) > 0.02 * np.mean(thicknesses):
         stated = ", ".join(f"{1e3 * one:.4g}" for one in thicknesses)
         raise SystemExit(f"{arguments.file}: its measurements are of sheets of {stated} mm; give one sheet, or --thickness-mm")
