@@ -140,10 +140,14 @@ pub fn stored_band(fit: &material::Fit, beam_rad: f64, theta_rad: f64) -> Option
     Some(Band { low: mid / factor, mid, high: mid * factor })
 }
 
-/// Names of the numbers of a law that its curve does not determine by themselves. The looks are no part of the level.
+/// Names of the numbers of a law that have no variance at all, not even together with others: those at a bound. The looks
+/// are no part of the level.
 pub fn undetermined(report: &material::FitReport) -> impl Iterator<Item = &str> {
-    let unknown = report.estimates.iter().filter(|one| one.sd.is_none() && one.name != "looks");
-    unknown.map(|one| one.name.as_str())
+    let variance = |at: usize| report.covariance.get(at)?.get(at).copied();
+    let unknown = report.estimates.iter().enumerate().filter(move |(at, one)| {
+        one.sd.is_none() && one.name != "looks" && variance(*at).unwrap_or(0.0) == 0.0
+    });
+    unknown.map(|(_, one)| one.name.as_str())
 }
 
 /// d ln σ⁰ / d estimate; 0 for an estimate that is not a parameter of the model, such as the looks.

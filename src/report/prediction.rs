@@ -98,7 +98,7 @@ fn no_band(fit: Option<&Fit>) -> Option<String> {
     if unknown.is_empty() {
         return None;
     }
-    Some(format!("the curve does not determine {} by itself", unknown.join(", ")))
+    Some(format!("the fit stopped at the end of the range of {}", unknown.join(", ")))
 }
 
 /// The angles that a text names, °: `0:80:5` (first, last, step) or `10,20,30`.

@@ -31,16 +31,16 @@ pub enum CurveDiagnoseError {
     },
     /// Two repeats of the curve are of different levels.
     #[error(
-        "repeats {} and {} of the angles contradict each other: they are {:.1} dB apart on average, and this difference \
-         scatters by {:.1} dB over the angles; find what changed between them, or diagnose each by itself",
+        "repeats {} and {} of the angles contradict each other: they are {:.1} dB apart at one end of the angles, \
+         and their difference scatters by {:.1} dB about a line; find what changed between them, or diagnose each by itself",
         .repeats[0], .repeats[1], .apart_db, .scatter_db
     )]
     Contradiction {
         /// Their numbers, from 1, in the order of the file.
         repeats: [usize; 2],
-        /// How far apart they are, dB.
+        /// How far apart they are at the end of the angles where they are farther, dB.
         apart_db: f64,
-        /// Standard deviation of the difference, dB.
+        /// Standard deviation of the difference about a line, dB.
         scatter_db: f64,
     },
     /// The noise is unknown.

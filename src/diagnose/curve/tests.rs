@@ -279,7 +279,7 @@ fn repeats_that_contradict_each_other_are_refused() {
     let run = |points: &Points| CurveDiagnosis::default().run(points, &law(), &terms());
     let error = run(&two_runs([6.0; 2])).unwrap_err().to_string();
     assert!(
-        error.starts_with("repeats 1 and 2 of the angles contradict each other: they are 6.0 dB"),
+        error.starts_with("repeats 1 and 2 of the angles contradict each other: they are 6.1 dB"),
         "{error}"
     );
     let error = run(&two_runs([-3.0, 3.0])).unwrap_err().to_string();

@@ -85,6 +85,8 @@ mod tests {
         // A lobe of 3° beside a diffuse part: no fringe shows where only that returns.
         law.set_parameter("0.albedo", 0.1);
         law.set_parameter("1.m", 0.05);
+        let points = Points { points: in_plane(&law, &[30.0], 5.0), ..points };
+        assert!(fringes(&points, &base_law(), &[0.4, 3.2]) > 0.4);
         assert!(fringes(&points, &law, &[0.4, 3.2]) < 0.2);
     }
 

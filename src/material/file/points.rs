@@ -538,7 +538,7 @@ mod tests {
     #[test]
     fn a_row_that_says_too_little_or_too_much_is_named_by_its_line() {
         for (row, said) in [
-            ("60,,,,", "line 3, column sigma0_db: the cell is empty; where nothing was detected"),
+            ("60,,,,", "line 3, column sigma0_db: the cell is empty; leave the line out, or"),
             ("60,,left,,", "line 3, column threshold_db: the cell is empty; give the limit, in σ⁰"),
             ("60,-3,left,-30,", "line 3, column sigma0_db: the row has a level and is censored"),
             ("60,-3,none,,1", "line 3, column censored: `1` is not accepted here"),
