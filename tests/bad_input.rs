@@ -331,8 +331,7 @@ fn materials_that_are_not_there() {
     check(&run(&["add", "ptfe@1"]), &["bare name"]);
     check(&run(&["add", "--from", "none.toml"]), &["cannot read none.toml"]);
     check(&run(&["add", "--from", "."]), &["holds no material.toml"]);
-    for (angles, says) in [("0:80", "no list of angles"), ("0:90:5", "90°"), ("x", "not a number")]
-    {
+    for (angles, says) in [("0:80", "names no angles"), ("0:90:5", "90°"), ("x", "not a number")] {
         let predict = ["predict", "ptfe", "--angles", angles];
         let output = matdb(folder.path()).args(predict).output().unwrap();
         let said = String::from_utf8(output.stderr).unwrap();

@@ -207,7 +207,11 @@ fn what_does_not_calibrate_is_refused() {
         (good, "stretched.toml", &["mesh `target`", "`scale`"]),
         (good, &mannequin, &["calibration target", "builtin:calibration-plate"]),
         (good, "builtin:calibration-plat", &["did you mean `builtin:calibration-plate`?"]),
-        (good, "builtin:calibration-sphere", &[good, "ray of their chirp", "the radar's scan"]),
+        (
+            good,
+            "builtin:calibration-sphere",
+            &[good, "which the scan does not have", "the scan of the measurement"],
+        ),
     ] {
         let text = refused(matdb(at).args(["calibrate", cloud, "--scene", scene]));
         assert!(parts.iter().all(|part| text.contains(part)), "{scene}: {text}");
