@@ -135,7 +135,7 @@ fn a_curve_is_fitted_stored_rendered_and_listed() {
     });
     fs::write(folder.join("lit.csv"), lit).unwrap();
     let [saved, predict] = [
-        "fit lit.csv --starts 1 --save concrete --kind synthetic --source T --frequency 300",
+        "fit lit.csv --starts 1 --save concrete --kind synthetic --source T --instrument T --frequency 300 --threshold -77",
         "predict concrete --angles 0:20:2",
     ];
     json(folder, &saved.split(' ').collect::<Vec<&str>>());
