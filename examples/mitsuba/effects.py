@@ -3,6 +3,7 @@
 `apply(state, size, rng)` changes the state. Draws come from rng in the same order whatever the size."""
 
 import functools
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -10,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from scipy.special import polygamma
 
 import physics
+import refit
 import scan
 import targets
 
@@ -245,12 +247,8 @@ def thin_film(s, size, rng):
 
 
 def correlated_shadowing(s, size, rng):
-    """G1 in place of its square, with Smith's function of the lobe's own slopes as Walter gives it."""
-    slope = s.material["m"] * np.tan(np.maximum(s.theta(), 1e-6))
-    a = 1 / slope
-    g = np.where(a < 1.6, (3.535 * a + 2.181 * a**2) / (1 + 2.276 * a + 2.577 * a**2), 1.0)
-    if s.material["distribution"] == "ggx":
-        g = 2 / (1 + np.sqrt(1 + slope**2))
+    """G1 in place of its square, with Smith's function of the lobe's own slopes."""
+    g = physics.smith(s.material["distribution"], s.material["m"] * np.tan(s.theta()))
     s.numbers["correlated-shadowing"] = [{"share": min(size, 1.0)}]
     s.lobe_gain = s.lobe_gain * g**-min(size, 1.0)
 
@@ -278,30 +276,26 @@ EFFECTS = {
     **{kind: functools.partial(unknown, kind=kind) for kind in UNKNOWN},
 }
 KNOWN = [n for n in EFFECTS if n not in UNKNOWN]
-# Sizes below and beyond which an effect would not be itself: a spot of less than 1 mm changes a few chirps at edges.
+# Sizes below and beyond which an effect would not be itself: a spot of less than 1 mm changes a few chirps at edges, and
+# a ceiling more than 17 dB below the strongest echo makes all echoes alike.
 START = {"finite-spot": 0.1}
-LIMIT = {"finite-spot": 3.2, "thin-film": 1.0, "correlated-shadowing": 1.0}
+LIMIT = {"compression": 50.0, "finite-spot": 3.2, "thin-film": 1.0, "correlated-shadowing": 1.0}
 # Where an effect needs a target of its own: a lobe that is seen all around, a concave place, a rough lobe.
 BASES = {"multi-bounce": ["groove"], "correlated-shadowing": ["vase"]}
 
 
-def refit_columns(before, use):
-    """What small changes of level, lobe level, lobe width and the diffuse part's slope add to the powers in dB."""
-    theta, share = before.theta()[use], before.means_mw()[1][use]
-    law, step = before.law, 1e-3
-    steeper = np.log(law.bare(np.arctan(np.tan(theta) * (1 + step)), "lobe") / law.bare(theta, "lobe")) / step
-    return np.stack([np.ones(len(theta)), share, share * steeper, (1 - share) * np.log(np.cos(theta))], -1)
+class Sized(NamedTuple):
+    """Size of an effect, and what it leaves after a refit of the law: rms of the mean powers in dB, and nats in ln p."""
+
+    size: float
+    left_db: float
+    gain: float = 0.0
 
 
-def left_after_refit_db(before, after):
-    """Rms change, dB, that level, lobe level, lobe width and the diffuse part's slope cannot follow."""
-    p0, p1 = before.means_mw()[0], after.means_mw()[0]
-    if after.ceiling_mw is not None:
-        p1 = after.ceiling_mw * np.tanh(np.sqrt(p1 / after.ceiling_mw)) ** 2
-    use = (before.range_m > 0) & (after.range_m > 0) & (p0 > physics.mw(physics.THRESHOLD_DBM))
-    change, columns = (physics.db(p1) - physics.db(p0))[use], refit_columns(before, use)
-    fitted = columns @ np.linalg.lstsq(columns, change, rcond=None)[0]
-    return float(np.sqrt(np.mean((change - fitted) ** 2)))
+def refitted(law, after):
+    """The refit of an undisturbed law to the mean powers of a state, over the chirps that had an echo."""
+    use = (law.power_mw > physics.mw(physics.THRESHOLD_DBM)) & (after.range_m > 0)
+    return law.fit(after.seen_mw(), use)
 
 
 def stated_forms(s):
@@ -318,13 +312,11 @@ def stated_forms(s):
 
 
 def numbers_of_gains(before, gain_db, use):
-    """Numbers of the stated forms of each gain: a fit without noise, of the laws and of the form, to the true gain."""
-    out, base = {}, refit_columns(before, use)
-    for name, form in ((n, f) for n in gain_db for f in stated_forms(before)[n]):
-        columns = np.concatenate([base, np.stack([c[use] for c in form.values()], -1)], 1)
-        fitted = np.linalg.lstsq(columns, gain_db[name][use], rcond=None)[0]
-        out.setdefault(name, []).append(dict(zip(form, map(float, fitted[base.shape[1]:]))))
-    return out
+    """Numbers of the stated forms of each gain: a fit without noise, of the law and of the form, to the true gain."""
+    law, forms = refit.Law(before), stated_forms(before)
+    return {
+        name: [dict(zip(form, law.fit(law.power_mw * physics.mw(gain), use, form.values()).of_forms())) for form in forms[name]]
+        for name, gain in gain_db.items()}
 
 
 def looks_for(declared, excess_db):
@@ -339,18 +331,25 @@ def looks_for(declared, excess_db):
 
 
 def calibrate(make, name, strength, seed, looks):
-    """Size of an effect for a strength, and the rms that it leaves, dB."""
+    """An effect with the size for a strength."""
     if name == "speckle":
-        return looks_for(looks, SPECKLE_EXCESS_DB[strength]), SPECKLE_EXCESS_DB[strength]
+        return Sized(looks_for(looks, SPECKLE_EXCESS_DB[strength]), SPECKLE_EXCESS_DB[strength])
     if name == "noise-floor":
-        return NOISE_DB[strength], 0.0
-    goal, start = RMS_DB[strength], START.get(name, 1e-2)
+        return Sized(NOISE_DB[strength], 0.0)
+    goal, start, law = RMS_DB[strength], START.get(name, 1e-2), refit.Law(make())
 
-    def left(size, draft=True):
-        before, after = make(), make()
+    def fit(size, draft=False):
+        after = make()
         after.draft = draft
         EFFECTS[name](after, size, np.random.default_rng(seed))
-        return left_after_refit_db(before, after)
+        return refitted(law, after)
+
+    def left(size):
+        return fit(size, draft=True).rms_db()
+
+    def found(size):
+        whole = fit(size)
+        return Sized(float(size), whole.rms_db(), whole.loss(looks))
 
     # the first crossing on the way up: a ceiling over everything leaves nothing again
     low = best = start
@@ -363,14 +362,13 @@ def calibrate(make, name, strength, seed, looks):
             break
         low, size = size, (size * 2 if size == limit else min(size * 2, limit))
     if most < goal or size == start:
-        return best, most
+        return found(best)
     high = size
     for _ in range(6 if name == "finite-spot" else 12):
         middle = np.sqrt(low * high)
         low, high = (middle, high) if left(middle) < goal else (low, middle)
-    now = left(high, draft=False)
-    if name == "finite-spot" and abs(now / goal - 1) > 0.03:  # the draft was off
+    whole = found(high)
+    if name == "finite-spot" and abs(whole.left_db / goal - 1) > 0.03:  # the draft was off
         slope = np.log(left(1.2 * high) / left(high / 1.2)) / np.log(1.44)
-        high *= (goal / now) ** (1 / max(slope, 0.3))
-        now = left(high, draft=False)
-    return high, now
+        whole = found(high * (goal / whole.left_db) ** (1 / max(slope, 0.3)))
+    return whole

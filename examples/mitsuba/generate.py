@@ -13,6 +13,7 @@ import numpy as np
 import diagnoses
 import effects
 import physics
+import refit
 import scan
 import targets
 from target_state import State
@@ -195,14 +196,14 @@ def untouched(name, plan):
 
 @functools.lru_cache
 def calibrated(name, plan, index):
-    """Size of an effect of a plan on a target, and what it leaves, dB."""
+    """An effect of a plan with its size for a target."""
     return effects.calibrate(lambda: untouched(name, plan), plan.labels[index], plan.strength, plan.draw(index), LOOKS)
 
 
 def reaches(name, plan):
     """Whether every effect of a plan gets as strong as wanted on a target."""
     goal = effects.RMS_DB[plan.strength]
-    left = [calibrated(name, plan, i)[1] for i, label in enumerate(plan.labels) if label not in OWN_STRENGTH]
+    left = [calibrated(name, plan, i).left_db for i, label in enumerate(plan.labels) if label not in OWN_STRENGTH]
     return all(0.95 * goal <= rms <= 1.1 * goal for rms in left)
 
 
@@ -219,14 +220,13 @@ def tilt_spread_db(state, size, use):
 def range_gain(before, ranges, use):
     """Gain in ln p that the ranges alone offer; of a chirp no more than a false alarm would cost."""
     change = (ranges - before.range_m)[use & (before.range_m > 0)] / physics.RANGE_SD_M
-    ceiling = np.log(physics.GATE_M / physics.RANGE_SD_M / physics.FALSE_ALARM)
-    return float(np.sum(np.minimum(change**2 / 2, ceiling)))
+    return float(np.sum(np.minimum(change**2 / 2, refit.MOST)))
 
 
 @functools.lru_cache
 def generator():
     """Digest of what a case depends on besides its plan."""
-    files = ["build_bases", "effects", "generate", "physics", "scan", "sets", "target_state", "targets"]
+    files = ["build_bases", "effects", "generate", "physics", "refit", "scan", "sets", "target_state", "targets"]
     bases = [os.path.relpath(path, HERE) for path in sorted(glob.glob(f"{HERE}/bases/*.npz"))]
     return diagnoses.digest(HERE, [f"{name}.py" for name in files] + bases)
 
@@ -266,12 +266,11 @@ def case(out, plan):
     rng = np.random.default_rng([plan.seed, number])
     w0 = physics.waist_m(speckle_mm)
     before = untouched(name, plan)
-    state, sizes, rms = untouched(name, plan), {}, {}
+    state, sizes = untouched(name, plan), {}
     for index, label in enumerate(labels):
-        size, left = calibrated(name, plan, index)
-        effects.EFFECTS[label](state, size, np.random.default_rng(plan.draw(index)))
-        said = "unknown" if label in effects.UNKNOWN else label
-        sizes[said], rms[said] = float(size), float(left)
+        found = calibrated(name, plan, index)
+        effects.EFFECTS[label](state, found.size, np.random.default_rng(plan.draw(index)))
+        sizes["unknown" if label in effects.UNKNOWN else label] = found
     level = float(rng.normal(0, plan.level_sd))
     power, share = state.means_mw()
     power = power * physics.mw(level)
@@ -303,9 +302,12 @@ def case(out, plan):
     both = echo & (before.range_m > 0)
     truth = {
         "base": name, "labels": list(sizes), "strength": plan.strength if labels else None,
-        "kind": next((n for n in labels if n in effects.UNKNOWN), None), "sizes": sizes,
+        "kind": next((n for n in labels if n in effects.UNKNOWN), None),
+        "sizes": {label: found.size for label, found in sizes.items()},
         "numbers": {**state.numbers, **effects.numbers_of_gains(before, state.gain_db, both)},
-        "left_after_refit_db": rms, "reaches_strength": reaches(name, plan),
+        "left_after_refit_db": {label: found.left_db for label, found in sizes.items()},
+        "power_gain": {label: found.gain for label, found in sizes.items()},
+        "reaches_strength": reaches(name, plan),
         "level_offset_db": level, "speckle": f"shared, w0 = {speckle_mm} mm" if shared else "independent",
         "looks": float(looks), "declared_looks": LOOKS,
         "noise_dbm": float(physics.db(declared_noise * state.noise_gain)),
@@ -315,7 +317,7 @@ def case(out, plan):
         "law": {k: v for k, v in targets.MATERIALS[name].items()}, "start": start,
     }
     if "angle-error" in labels:
-        truth["tilt_spread_db"] = tilt_spread_db(state, sizes["angle-error"], echo)
+        truth["tilt_spread_db"] = tilt_spread_db(state, sizes["angle-error"].size, echo)
     return truth
 
 

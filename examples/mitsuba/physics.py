@@ -1,5 +1,7 @@
 """One Gaussian beam, its speckle and its noise, in numpy: from the equations alone, with no code of the program."""
 
+import functools
+
 import numpy as np
 from scipy.special import gammaincc, gammainccinv
 
@@ -10,6 +12,7 @@ POWER_DBM, FOCUS_M, THRESHOLD_DBM = 7.0, 8.0, -77.0
 RANGE_SD_M = 0.001
 GATE_M, GATE_START_M = 1.0, 7.5
 FALSE_ALARM = 3e-4  # of a gate without an echo
+LN_WIDTH = np.linspace(-1.6, 1.6, 17)  # ln of what multiplies m, where a table has the lobe
 # Half width at 1/e of the field for a spot of 16 mm, by what "diameter" means.
 SPOT = {8.0: "1/e2", 13.6: "one-way-fwhm", 19.2: "two-way-fwhm"}
 
@@ -38,29 +41,52 @@ def mw(x):
     return 10 ** (np.asarray(x) / 10)
 
 
+def smith(distribution, slope):
+    """G1 at m tan(theta), as Walter gives it."""
+    if distribution == "ggx":
+        return 2 / (1 + np.sqrt(1 + slope**2))
+    a = 1 / np.maximum(slope, 1e-9)
+    return np.where(a < 1.6, (3.535 * a + 2.181 * a**2) / (1 + 2.276 * a + 2.577 * a**2), 1.0)
+
+
 class Law:
     """f(theta) of Mitsuba's table, convolved over slope with the beam's own kernel exp(-s^2/d^2)/(pi d^2)."""
 
-    def __init__(self, base, w0):
-        self.angle = base["angle_rad"]
-        self.log = {"lobe": np.log(np.maximum(base["f_lobe"], 1e-300))}
-        rest = base["f_all"] - base["f_lobe"]
-        self.log["rest"] = np.log(np.maximum(rest, 1e-300))
+    def __init__(self, base, w0, material):
+        self.angle, self.material = base["angle_rad"], material
+        parts = {"lobe": base["f_lobe"], "rest": base["f_all"] - base["f_lobe"]}
+        self.log = {part: np.log(np.maximum(f, 1e-20)) for part, f in parts.items()}  # below it Mitsuba says 0
         self.delta = WAVELENGTH_M / (2 * np.pi * beam_width_m(w0, FOCUS_M + np.array([0.0, 0.25, 0.5])))[::-1]
+        self.wide = {part: self.convolved(functools.partial(self.bare, part=part)) for part in self.log}
+
+    def convolved(self, bare):
+        """ln of a law after the beam: a row for each delta, over the angles of the table."""
         x, w = np.polynomial.hermite.hermgauss(15)
         a, b = np.meshgrid(x, x)
         weight = np.outer(w, w) / np.pi
         slope = np.tan(self.angle)[:, None, None]
-        self.wide = {}
-        for part in self.log:
-            rows = [np.sum(weight * self.bare(np.arctan(np.hypot(slope + d * a, d * b)), part), axis=(1, 2)) for d in self.delta]
-            self.wide[part] = np.log(np.array(rows))
+        rows = [np.sum(weight * bare(np.arctan(np.hypot(slope + d * a, d * b))), axis=(1, 2)) for d in self.delta]
+        return np.log(np.array(rows))
 
     def bare(self, theta, part):
         return np.exp(np.interp(theta, self.angle, self.log[part]))
 
+    def rougher(self, theta, width):
+        """The lobe before the beam of a surface with `width` times the m: f cos^6/G1^2 is the density of its slopes."""
+        met, m = np.arctan(np.tan(theta) / width), self.material["m"]
+        g, g_met = (smith(self.material["distribution"], slope) for slope in (width * m * np.tan(theta), m * np.tan(met)))
+        return self.bare(met, "lobe") * (np.cos(met) / np.cos(theta)) ** 6 * (g / g_met) ** 2 / width**2
+
+    @functools.cached_property
+    def lobes(self):
+        """Tables of the lobe after the beam, for e^x times the m, x of LN_WIDTH."""
+        return [self.convolved(functools.partial(self.rougher, width=np.exp(x))) for x in LN_WIDTH]
+
     def f(self, theta, delta, part):
-        rows = np.array([np.interp(theta, self.angle, r) for r in self.wide[part]])
+        return self.at(self.wide[part], theta, delta)
+
+    def at(self, table, theta, delta):
+        rows = np.array([np.interp(theta, self.angle, r) for r in table])
         step = (self.delta[1:] - self.delta[:-1])[:, None]
         share = np.clip((np.clip(delta, self.delta[0], self.delta[-1]) - self.delta[:-1, None]) / step, 0, 1)
         return np.exp(rows[0] + np.sum(share * (rows[1:] - rows[:-1]), axis=0))

@@ -58,19 +58,18 @@ def expected_gain(truth, folder):
         share = independent_share(os.path.join(folder, truth.get("rays", "rays.csv")), float(truth["speckle"].split()[-2]) / 1000)
     out = {}
     for label in truth["labels"]:
-        left = truth["left_after_refit_db"][label] * math.log(10) / 10  # nepers of power
         if label == "speckle":
             out[label] = share * echoes * divergence(truth["looks"], 0.0, looks)
         elif label == "angle-error":
             # every chirp has a tilt of its own, which neighbours that share a speckle show the better: at least this
-            spread = [s * math.log(10) / 10 for s in truth.get("tilt_spread_db", [])] or [left]
+            spread = [s * math.log(10) / 10 for s in truth["tilt_spread_db"]]  # nepers of power
             out[label] = echoes * sum(divergence(looks, s, looks) for s in spread) / len(spread)
         elif label == "noise-floor":  # by its false alarms alone, which share no speckle
             empty = truth["chirps"] - truth["hits"] * (1 - truth["silent_share_of_hits"])
             count, declared = truth["false_alarms"], max(empty, 1) * FALSE_ALARM
             out[label] = count * math.log(count / declared) - count + declared if count > declared else 0.0
         else:
-            out[label] = share * echoes * looks * left**2 / 2
+            out[label] = share * truth["power_gain"][label]
             if label in ("motion", "pose"):  # which the ranges show as well
                 out[label] += truth.get("range_gain", 0.0)
     return out

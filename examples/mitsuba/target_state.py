@@ -7,10 +7,15 @@ import physics
 import scan
 import targets
 
+LAWS = {}  # of each target and waist
+
 
 class State:
     def __init__(self, base, name, w0, pattern="once"):
-        self.base, self.name, self.w0, self.pattern, self.law = base, name, w0, pattern, physics.Law(base, w0)
+        self.base, self.name, self.w0, self.pattern = base, name, w0, pattern
+        if (name, w0) not in LAWS:
+            LAWS[name, w0] = physics.Law(base, w0, targets.MATERIALS[name])
+        self.law = LAWS[name, w0]
         self.material = targets.MATERIALS[name]
         self.aim, self.time_s = scan.aims(pattern)
         self.n = len(self.aim)
@@ -51,8 +56,12 @@ class State:
         w = physics.beam_width_m(self.w0, range_m)
         return physics.mw(physics.POWER_DBM - physics.loss_db(self.w0)) * physics.WAVELENGTH_M**2 / (np.pi * w**2)
 
+    def delta(self, range_m):
+        """Slopes over which the beam spreads a law: its kernel is exp(-s^2/delta^2)."""
+        return physics.WAVELENGTH_M / (2 * np.pi * physics.beam_width_m(self.w0, range_m))
+
     def parts_mw(self, theta, range_m, slope_scale=1.0):
-        delta = physics.WAVELENGTH_M / (2 * np.pi * physics.beam_width_m(self.w0, range_m))
+        delta = self.delta(range_m)
         power = 2 if self.material["footprint"] == "paper" else 1
         common = self.scale_mw(range_m) * np.cos(theta) ** power
         met = np.arctan(np.tan(theta) * slope_scale)
@@ -72,6 +81,14 @@ class State:
         if self.spread is not None:
             total, share = np.where(hit, self.spread * self.gain, 0.0), self.spread_share
         return total, share
+
+    def seen_mw(self):
+        """Mean power of each chirp: below a ceiling the mean, over speckle, of what the ceiling leaves of a look."""
+        power = self.means_mw()[0]
+        if self.ceiling_mw is None:
+            return power
+        looks, weight = np.polynomial.laguerre.laggauss(32)
+        return self.ceiling_mw * np.tanh(np.sqrt(np.outer(power, looks) / self.ceiling_mw)) ** 2 @ weight
 
     def move(self, shift, turn):
         """The target moves: for each chirp a shift, m, and a turn about the centre as a rotation vector, rad.
