@@ -153,6 +153,7 @@ class Missing:
 
     def result(self, size, left, reached):
         number = self.number if self.number is None else float(self.number)
+        reached = reached and np.ptp(db(self.level(size))) <= DROP_DB
         truth = {"id": f"B/{self.k:05}", "effect": self.effect, "noise_db": self.noise, "to_deg": self.to,
                  "declared": self.declared, "lobes": self.base.lobes, "diffuse": self.base.diffuse, "size": size,
                  "number": number, "left_db": left, "reached": bool(reached)}
@@ -217,7 +218,8 @@ def left_by_others(declared, thetas, noises, levels_db):
 
 
 def missing(seed, count):
-    """Part B; a case whose effect cannot get that large is drawn again, and marked where this does not help."""
+    """Part B; a case whose effect cannot get that large, or takes a curve too far down, is drawn again, and marked where
+    this does not help."""
     done, drawn, wanted = {}, {}, range(count)
     for attempt in range(TRIES):
         cases = [Missing(seed, k, attempt) for k in wanted]

@@ -23,6 +23,8 @@ const NOTHING_DB: f64 = -200.0;
 /// Step of the derivatives in the search.
 const STEP: f64 = 1e-5;
 const SEARCH: Minimise = Minimise { iterations: 150, tolerance: 1e-5, patience: usize::MAX };
+/// The first steps of a search, which show where it goes.
+const GLANCE: Minimise = Minimise { iterations: 4, tolerance: 1e-5, patience: usize::MAX };
 /// Rounds of fit and scale: with censored levels each depends on the other.
 const ROUNDS: usize = 3;
 
@@ -155,13 +157,13 @@ impl Model {
         let bounds = self.bounds();
         let censored = chosen.iter().any(|point| point.censored);
         let mut scale_db = self.scale_db(start, &chosen, points.noise.sd_db);
-        let mut found = self.search(start, &bounds, &chosen, scale_db);
+        let mut found = self.search(&SEARCH, start, &bounds, &chosen, scale_db);
         for round in 1..=ROUNDS {
             scale_db = self.scale_db(&found.at, &chosen, points.noise.sd_db);
             if !censored || round == ROUNDS {
                 break;
             }
-            found = self.search(&found.at, &bounds, &chosen, scale_db);
+            found = self.search(&SEARCH, &found.at, &bounds, &chosen, scale_db);
         }
         let levels = self.levels_db(&found.at, &chosen);
         let log_p = chosen.iter().zip(&levels).map(|(p, db)| log_p(p, *db, scale_db)).sum();
@@ -169,14 +171,22 @@ impl Model {
         Fit { scale_db, log_p, converged: found.converged(), curvature, at: found.at }
     }
 
+    /// The end of a few steps of the search from a start.
+    pub fn glance(&self, points: &Points, start: &DVector<f64>) -> DVector<f64> {
+        let all = &points.points;
+        let scale_db = self.scale_db(start, all, points.noise.sd_db);
+        self.search(&GLANCE, start, &self.bounds(), all, scale_db).at
+    }
+
     fn search(
         &self,
+        search: &Minimise,
         start: &DVector<f64>,
         bounds: &[DVector<f64>; 2],
         points: &[Point],
         scale_db: f64,
     ) -> Minimum {
-        SEARCH.run_with(
+        search.run_with(
             start,
             [&bounds[0], &bounds[1]],
             |at| cost(points, &self.levels_db(at, points), scale_db),

@@ -61,6 +61,11 @@ pub(super) fn unexplained(selection: &Selection, state: &State) -> Vec<CurveUnkn
     found
 }
 
+/// Whether a model leaves no structure beyond a noise that is known.
+pub(super) fn leaves_nothing(selection: &Selection, state: &State) -> bool {
+    selection.points.has_known_noise() && unexplained(selection, state).is_empty()
+}
+
 /// A smooth curve over one angle, if it predicts held-out angles.
 fn over(selection: &Selection, state: &State, covariate: &Covariate) -> Option<CurveUnknown> {
     let Selection { points, settings, .. } = *selection;

@@ -56,7 +56,12 @@ impl CurveDiagnosis {
             let width_deg = folds.width_rad.to_degrees();
             return Err(CurveDiagnoseError::TooShort { blocks: folds.blocks, width_deg });
         }
-        let selection = Selection { points, folds: &folds, settings: self };
+        let selection = Selection {
+            points,
+            folds: &folds,
+            settings: self,
+            leaves_nothing: &remains::leaves_nothing,
+        };
         let before = selection.state(model, fitted);
         let mut compared = vec![Compared::new(&selection, DECLARED, before)];
         if !compared[0].explains() {

@@ -1,4 +1,5 @@
-//! The choice of terms: one by one, fitted with everything else, and added when they predict held-out angles.
+//! The choice of terms: one by one, fitted with everything else, and added when nothing is left with them or when they
+//! predict held-out angles.
 
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -10,6 +11,8 @@ use super::points::Points;
 use super::settings::CurveDiagnosis;
 use super::terms::Term;
 
+/// Starts of a term of which the first steps are taken.
+const GLANCED: usize = 64;
 /// Starts of a term that are followed to their end.
 const FOLLOWED: usize = 8;
 /// Terms of a round that are judged on held-out angles.
@@ -43,6 +46,8 @@ pub(super) struct Selection<'a> {
     pub points: &'a Points,
     pub folds: &'a Folds,
     pub settings: &'a CurveDiagnosis,
+    /// Whether a model leaves no more than a known noise.
+    pub leaves_nothing: &'a (dyn Fn(&Selection, &State) -> bool + Sync),
 }
 
 /// A fit of one more term.
@@ -50,6 +55,7 @@ struct Trial {
     term: &'static dyn Term,
     ranked: RankedTerm,
     state: Option<State>,
+    leaves_nothing: bool,
     model: Model,
     fitted: Fit,
 }
@@ -77,7 +83,7 @@ impl Selection<'_> {
         State { model, fitted, of_fold, held_out }
     }
 
-    /// Adds terms while one is supported.
+    /// Adds terms while one is supported, and something is left.
     pub fn run(
         &self,
         mut state: State,
@@ -97,7 +103,11 @@ impl Selection<'_> {
             });
             ranking.extend(trials.into_iter().map(|trial| trial.ranked));
             let Some(next) = next else { break };
+            let is_last = (self.leaves_nothing)(self, &next);
             state = next;
+            if is_last {
+                break;
+            }
         }
         (state, ranking, added)
     }
@@ -113,6 +123,7 @@ impl Selection<'_> {
         for trial in trials.iter_mut().take(SHORT_LIST).filter(|t| t.ranked.gain >= least_gain) {
             let with = self.state(trial.model.clone(), trial.fitted.clone());
             trial.ranked.held_out = Some(self.gain(&state.held_out, &with.held_out));
+            trial.leaves_nothing = (self.leaves_nothing)(self, &with);
             trial.state = Some(with);
         }
         trials
@@ -127,6 +138,12 @@ impl Selection<'_> {
         for values in term.starts() {
             let at = joined(&state.fitted.at, term, &values);
             starts.push((misfit(&model, &at, points), at));
+        }
+        starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        starts.truncate(GLANCED);
+        for (left, at) in &mut starts {
+            *at = model.glance(points, at);
+            *left = misfit(&model, at, points);
         }
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         let fits = starts.iter().take(FOLLOWED).map(|(_, at)| model.fit(points, &all, at));
@@ -144,7 +161,7 @@ impl Selection<'_> {
             converged: fitted.converged,
             accepted: false,
         };
-        Trial { term, ranked, state: None, model, fitted }
+        Trial { term, ranked, state: None, leaves_nothing: false, model, fitted }
     }
 
     /// Rms change of the levels by a model with one more term, dB.
@@ -175,32 +192,38 @@ impl Selection<'_> {
         }
     }
 
-    /// The supported term with the largest held-out gain.
+    /// The likeliest term that leaves nothing, else the supported one with the largest held-out gain.
     fn best(&self, trials: &[Trial]) -> Option<usize> {
-        let supported = (0..trials.len()).filter(|&index| self.is_supported(&trials[index].ranked));
+        let supported = (0..trials.len()).filter(|&index| self.is_supported(&trials[index]));
         supported.max_by(|&a, &b| {
-            let [a, b] = [a, b].map(|index| trials[index].held_out_gain());
-            a.total_cmp(&b)
+            let [a, b] = [a, b].map(|index| &trials[index]);
+            a.leaves_nothing.cmp(&b.leaves_nothing).then_with(|| {
+                let of = if a.leaves_nothing { Trial::likelihood } else { Trial::held_out_gain };
+                of(a).total_cmp(&of(b))
+            })
         })
     }
 
-    /// Whether a term predicts held-out angles and changes enough.
-    fn is_supported(&self, ranked: &RankedTerm) -> bool {
-        let Some([gain, se]) = ranked.held_out else { return false };
-        gain > self.settings.standard_errors * se
-            && gain > SAME
-            && ranked.size_db >= self.settings.least_size_db
+    /// Whether a term changes enough, and leaves nothing or predicts held-out angles.
+    fn is_supported(&self, trial: &Trial) -> bool {
+        let Some([gain, se]) = trial.ranked.held_out else { return false };
+        let is_predictive = gain > self.settings.standard_errors * se && gain > SAME;
+        (trial.leaves_nothing || is_predictive)
+            && trial.ranked.size_db >= self.settings.least_size_db
     }
 
-    /// Other supported terms that predict held-out angles as well as the best.
+    /// Other supported terms that predict held-out angles as well as the best, and leave as little.
     fn class(&self, trials: &[Trial], best: usize) -> Vec<&'static str> {
-        let Some(winner) = trials.get(best).and_then(|trial| trial.state.as_ref()) else {
+        let Some((best_leaves_nothing, winner)) =
+            trials.get(best).and_then(|trial| Some((trial.leaves_nothing, trial.state.as_ref()?)))
+        else {
             return Vec::new();
         };
         let mut class = Vec::new();
         for (index, trial) in trials.iter().enumerate() {
             if index != best
-                && self.is_supported(&trial.ranked)
+                && self.is_supported(trial)
+                && trial.leaves_nothing == best_leaves_nothing
                 && let Some(state) = &trial.state
             {
                 let [behind, se] = self.gain(&state.held_out, &winner.held_out);
@@ -223,6 +246,12 @@ impl Trial {
     /// Gain in ln p of held-out angles; 0 where it is unknown.
     fn held_out_gain(&self) -> f64 {
         self.ranked.held_out.map_or(0.0, |[gain, _]| gain)
+    }
+
+    /// ln p of all angles, less Schwarz's penalty of the term.
+    fn likelihood(&self) -> f64 {
+        let count = self.state.as_ref().map_or(1, |state| state.held_out.len());
+        self.ranked.gain - 0.5 * self.ranked.numbers as f64 * (count as f64).ln()
     }
 
     /// Accepts the term: the addition, and the model with it.

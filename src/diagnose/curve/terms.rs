@@ -276,13 +276,13 @@ impl Term for ThinFilm {
          thickness is optical, in wavelengths.",
         "Maxima and minima over the angle, in backscatter densest near 50°. No other term goes up and down more \
          than once. Thicknesses with the same number of ripples over the angles cannot be distinguished.",
-        EffectParameter::new("visibility", "1", [-0.95, 0.95], 0.0, 0.02),
-        EffectParameter::new("thickness", "1", [0.1, 20.0], 1.0, 0.01),
+        EffectParameter::new("visibility", "1", [-0.99, 0.99], 0.0, 0.02),
+        EffectParameter::new("thickness", "1", [0.1, 22.0], 1.0, 0.01),
     );
 
     fn starts(&self) -> Vec<Vec<f64>> {
         // A tenth of a wavelength is a fifth of the period of the ripple's phase.
-        let thicknesses: Vec<f64> = (2..=200).map(|k| 0.1 * f64::from(k)).collect();
+        let thicknesses: Vec<f64> = (2..=220).map(|k| 0.1 * f64::from(k)).collect();
         pairs(&[-0.5, -0.2, 0.2, 0.5], &thicknesses)
     }
 

@@ -225,6 +225,47 @@ fn backscatter_of(
     Points::of_curve(&Curve::read(text.as_bytes()).unwrap(), &[], Some(noise_db)).unwrap()
 }
 
+/// A backscatter curve of 60 angles with a term of these numbers; step in degrees, noise in dB.
+fn backscatter_with(
+    law: &Brdf,
+    name: &str,
+    numbers: &[f64],
+    [step_deg, noise_db]: [f64; 2],
+) -> Points {
+    let (term, points) = (term(name).unwrap(), backscatter_of(step_deg, 60, 1.0, |_| 1.0).points);
+    backscatter_of(step_deg, 60, noise_db, |theta_rad| {
+        let point = &points[(theta_rad.to_degrees() / step_deg).round() as usize];
+        let f_per_sr = law.f_per_sr(point.i, point.o);
+        law.sigma0(theta_rad) * term.scatter(numbers, law, point, f_per_sr) / f_per_sr
+    })
+}
+
+#[test]
+fn a_lobe_that_one_run_holds_is_named_where_nothing_is_left_with_it() {
+    // Held out, a lobe within a run of angles is not predicted by the others.
+    let report = diagnosed(&backscatter_with(&law(), "instrument-lobe", &[0.1, 4.0], [1.0, 0.2]));
+    let found = &report.effects[0];
+    assert!(
+        [found.name].iter().chain(&found.class).any(|name| *name == "instrument-lobe"),
+        "{report:#?}"
+    );
+    assert_eq!(report.verdict, CurveVerdict::Explained);
+    let evidence = &found.evidence;
+    assert!(evidence.held_out_gain < 2.0 * evidence.held_out_se, "{evidence:?}");
+}
+
+#[test]
+fn a_film_that_almost_extinguishes_the_lobe_is_found() {
+    let mut law = law();
+    law.set_parameter("0.albedo", 0.08);
+    law.set_parameter("1.f_lambda", 0.32);
+    law.set_parameter("1.m", 0.21);
+    let report = diagnosed(&backscatter_with(&law, "thin-film", &[0.9, 9.5], [0.5, 0.5]));
+    assert_eq!(report.effects[0].name, "thin-film", "{report:#?}");
+    let thickness = report.effects[0].parameters["thickness"].value;
+    assert!((thickness - 9.5).abs() < 0.1, "{thickness}");
+}
+
 /// A backscatter curve every half degree, with a threshold.
 fn backscatter(threshold_db: f64, extra: impl Fn(f64) -> f64) -> Points {
     let law = law();

@@ -94,8 +94,8 @@ mod tests {
     #[test]
     fn a_number_at_a_bound_is_not_trusted_unless_there_it_means_nothing() {
         assert!(is_inside(&ThinFilm, &[0.4, 3.2]));
-        assert!(!is_inside(&ThinFilm, &[0.95, 3.2]));
-        assert!(!is_inside(&ThinFilm, &[0.4, 20.0]));
+        assert!(!is_inside(&ThinFilm, &[0.99, 3.2]));
+        assert!(!is_inside(&ThinFilm, &[0.4, 22.0]));
         let lobe = crate::diagnose::curve::term("diffuse-lobe").unwrap();
         assert!(is_inside(lobe, &[0.01]) && !is_inside(lobe, &[50.0]));
     }
