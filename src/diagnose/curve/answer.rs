@@ -135,13 +135,14 @@ impl Answer {
         }
     }
 
-    /// A model with the terms that it supports. They get no name where one of them cannot be trusted, or where the noise is
-    /// unknown.
+    /// A model with the terms that it supports. They get no name where one of them cannot be trusted, where the noise is
+    /// unknown, or where the law is another one and several terms do equally well: then the law may be wrong as well.
     fn with_terms(selection: &Selection, one: &Compared, terms: &[&'static dyn Term]) -> Answer {
         let (after, ranking, added) = selection.run(one.state.clone(), terms);
         let least_db = selection.settings.least_named_db;
         let is_trusted = selection.points.has_known_noise()
             && added.iter().all(|one| one.evidence.size_db >= least_db)
+            && (one.name == DECLARED || added.iter().all(|added| added.class.is_empty()))
             && are_trusted(selection.points, &one.state, &after, &added);
         if !is_trusted {
             let may_be = added.iter().map(|added| added.term.name()).collect();
