@@ -10,8 +10,8 @@ use crate::fit::normal_share;
 
 /// Name of structure of unknown origin.
 const UNKNOWN: &str = "unknown";
-/// Least structure beside a known noise, in standard deviations of that noise.
-const LEAST_OF_NOISE: f64 = 2.0;
+/// Least structure beside a known noise, in standard deviations of that noise: as much as the noise itself.
+const LEAST_OF_NOISE: f64 = 1.0;
 /// Scatters by which an isolated level is off.
 const FAR_OFF: f64 = 5.0;
 /// Largest share of the levels that are isolated, and of a scan's levels in one peak, in which three may always be.
