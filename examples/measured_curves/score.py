@@ -194,7 +194,8 @@ def stand_ins(pairs):
     for t, a in pairs:
         names = [e[0] for e in a["effects"]]
         wrong = bool(names) or a["verdict"] not in t["verdicts"]
-        rows[t["kind"]].update(curves=1, misses=wrong, named=bool(names), **{"thin film": "thin-film" in names})
+        film = {"thin film": int("thin-film" in names)}
+        rows[t["kind"]].update(curves=1, misses=int(wrong), named=int(bool(names)), **film)
         rows[t["kind"]][a["verdict"]] += 1
         if wrong:
             misses.append(f"- {t['id']}: {a['verdict']} {' '.join(names)} {a.get('error', '')}".rstrip())
@@ -212,7 +213,7 @@ def main():
     parser.add_argument("--matdb", default="matdb")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--parts", default="ABC")
-    parser.add_argument("--count", type=int, default=10**9, help="the first curves of part A, and of part B")
+    parser.add_argument("--count", type=int, default=10**9, help="the first curves of parts A and B, and of each kind of C")
     parser.add_argument("--record", help="a file of answers by this program: read first, and written at the end")
     parser.add_argument("--about", default="", help="first line of the record: the program's commit and the seed")
     parser.add_argument("--minutes", type=float, default=1e6, help="ask nothing after this time")
@@ -220,7 +221,7 @@ def main():
     a = parser.parse_args()
     with open(f"{a.folder}/truth.jsonl") as file:
         truths = [t for t in map(json.loads, file) if t["id"][0] in a.parts]
-    truths = [t for t in truths if t["id"][0] == "C" or int(t["id"][2:]) < a.count]
+    truths = [t for t in truths if int(t["id"][2:].split("-")[-1]) < a.count]
     # Curves without a name that is due come last.
     truths.sort(key=lambda t: (t["id"][0] != "A", t.get("others_leave", DUE + 1) <= DUE))
     asked = [t for t in truths if t.get("reached", True)]
