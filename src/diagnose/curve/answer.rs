@@ -51,12 +51,6 @@ impl Compared {
     }
 }
 
-/// Schwarz's criterion, halved (Ann. Stat. 6 (1978) 461): of models that explain a curve the one with the least is the best.
-fn criterion(selection: &Selection, state: &State) -> f64 {
-    let count = selection.points.points.len() as f64;
-    0.5 * state.model.unknowns() as f64 * count.ln() - state.fitted.log_p
-}
-
 /// The answer.
 pub(super) struct Answer {
     /// Name of the scattering model.
@@ -81,16 +75,15 @@ impl Answer {
         }
         let mut others: Vec<&Compared> = others.iter().collect();
         others.sort_by(|a, b| {
-            let [a, b] = [a, b].map(|one| criterion(selection, &one.state));
+            let [a, b] = [a, b].map(|one| one.state.criterion());
             a.total_cmp(&b)
         });
         if let Some(best) = others.iter().find(|one| one.explains()) {
             let with = Answer::with_terms(selection, declared, terms);
-            let least = criterion(selection, &best.state) - FAR_BETTER;
+            let least = best.state.criterion() - FAR_BETTER;
             let is_effect = with.added.iter().any(|one| !one.term.is_shape());
-            let is_far_better = is_effect
-                && with.unexplained.is_empty()
-                && criterion(selection, &with.after) < least;
+            let is_far_better =
+                is_effect && with.unexplained.is_empty() && with.after.criterion() < least;
             return if is_far_better { with } else { Answer::without_terms(best, Vec::new()) };
         }
         for one in compared {
@@ -103,7 +96,7 @@ impl Answer {
         let mut found: Vec<Answer> =
             bases.map(|one| Answer::with_terms(selection, one, terms)).collect();
         found.sort_by(|a, b| {
-            let [a, b] = [a, b].map(|one| criterion(selection, &one.after));
+            let [a, b] = [a, b].map(|one| one.after.criterion());
             a.total_cmp(&b)
         });
         let explaining = found.iter().position(|one| one.unexplained.is_empty());

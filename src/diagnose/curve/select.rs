@@ -33,6 +33,14 @@ pub(super) struct State {
     pub held_out: Vec<Score>,
 }
 
+impl State {
+    /// Schwarz's criterion, halved (Ann. Stat. 6 (1978) 461): of models that explain a curve the one with the least is the
+    /// best.
+    pub fn criterion(&self) -> f64 {
+        0.5 * self.model.unknowns() as f64 * (self.held_out.len() as f64).ln() - self.fitted.log_p
+    }
+}
+
 /// A term that was added.
 pub(super) struct Addition {
     pub term: &'static dyn Term,
@@ -95,6 +103,7 @@ impl Selection<'_> {
             left.retain(|term| added.iter().all(|added| added.term.name() != term.name()));
             let mut trials = self.trials(round, &state, &left);
             let best = self.best(&trials).filter(|_| round <= self.settings.most_terms);
+            let is_last = best.is_some_and(|index| trials[index].leaves_nothing);
             let next = best.and_then(|index| {
                 let class = self.class(&trials, index);
                 let (addition, next) = trials[index].accept(class);
@@ -103,7 +112,6 @@ impl Selection<'_> {
             });
             ranking.extend(trials.into_iter().map(|trial| trial.ranked));
             let Some(next) = next else { break };
-            let is_last = (self.leaves_nothing)(self, &next);
             state = next;
             if is_last {
                 break;
@@ -198,8 +206,11 @@ impl Selection<'_> {
         supported.max_by(|&a, &b| {
             let [a, b] = [a, b].map(|index| &trials[index]);
             a.leaves_nothing.cmp(&b.leaves_nothing).then_with(|| {
-                let of = if a.leaves_nothing { Trial::likelihood } else { Trial::held_out_gain };
-                of(a).total_cmp(&of(b))
+                if a.leaves_nothing {
+                    b.criterion().total_cmp(&a.criterion())
+                } else {
+                    a.held_out_gain().total_cmp(&b.held_out_gain())
+                }
             })
         })
     }
@@ -248,10 +259,9 @@ impl Trial {
         self.ranked.held_out.map_or(0.0, |[gain, _]| gain)
     }
 
-    /// ln p of all angles, less Schwarz's penalty of the term.
-    fn likelihood(&self) -> f64 {
-        let count = self.state.as_ref().map_or(1, |state| state.held_out.len());
-        self.ranked.gain - 0.5 * self.ranked.numbers as f64 * (count as f64).ln()
+    /// Schwarz's criterion, infinite where the term was not judged.
+    fn criterion(&self) -> f64 {
+        self.state.as_ref().map_or(f64::INFINITY, State::criterion)
     }
 
     /// Accepts the term: the addition, and the model with it.

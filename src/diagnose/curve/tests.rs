@@ -261,7 +261,7 @@ fn a_lobe_that_one_run_holds_is_named_where_nothing_is_left_with_it() {
 }
 
 #[test]
-fn a_film_that_almost_extinguishes_the_lobe_is_found() {
+fn a_film_of_deep_fringes_is_found() {
     let mut law = law();
     law.set_parameter("0.albedo", 0.02);
     law.set_parameter("1.f_lambda", 0.32);
