@@ -7,7 +7,7 @@ use super::remains;
 use super::report::{ComparedLaw, CurveUnknown};
 use super::select::{Addition, Selection, State};
 use super::terms::Term;
-use super::trust::are_trusted;
+use super::trust::{are_trusted, is_film};
 
 /// How much better the declared model with terms must be than another model that explains the curve by itself, in ln p less
 /// Schwarz's penalty: odds of 150 to one. Terms that make the declared model the other one are no better.
@@ -128,14 +128,16 @@ impl Answer {
         }
     }
 
-    /// A model with the terms that it supports. They get no name where one of them cannot be trusted, where the noise is
-    /// unknown, or where the law is another one and several terms do equally well: then the law may be wrong as well.
+    /// A model with the terms that it supports. They get no name where one of them cannot be trusted, or where the noise is
+    /// unknown. Beside another law than the declared one only a film has a name: no law has fringes, but other effects may
+    /// stand for a law that is wrong as well.
     fn with_terms(selection: &Selection, one: &Compared, terms: &[&'static dyn Term]) -> Answer {
         let (after, ranking, added) = selection.run(one.state.clone(), terms);
         let least_db = selection.settings.least_named_db;
         let is_trusted = selection.points.has_known_noise()
             && added.iter().all(|one| one.evidence.size_db >= least_db)
-            && (one.name == DECLARED || added.iter().all(|added| added.class.is_empty()))
+            && (one.name == DECLARED
+                || added.iter().all(|added| is_film(added.term) && added.class.is_empty()))
             && are_trusted(selection.points, &one.state, &after, &added);
         if !is_trusted {
             let may_be = added.iter().map(|added| added.term.name()).collect();

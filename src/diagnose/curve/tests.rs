@@ -145,6 +145,37 @@ fn a_lobe_of_another_shape_is_another_law_and_no_effect() {
 }
 
 #[test]
+fn beside_another_law_only_a_film_has_a_name() {
+    const OTHER: &str = "two GGX lobes over Lambert";
+    let mut laws = laws::other_laws(&base_law());
+    laws.retain(|(name, _)| *name == OTHER);
+    let (_, mut law) = laws.pop().unwrap();
+    for (path, value) in [
+        ("0.albedo", 0.06),
+        ("1.f_lambda", 0.02),
+        ("1.m", 0.06),
+        ("2.f_lambda", 0.04),
+        ("2.m", 0.4),
+    ] {
+        law.set_parameter(path, value);
+    }
+    let report_of = |name: &str, numbers: &[f64]| {
+        let term = term(name).unwrap();
+        let values = noisy(&INCIDENCES_DEG, 2.0, NOISE_DB, |point| {
+            let f = law.f_per_sr(point.i, point.o);
+            db_from_ratio(term.scatter(numbers, &law, point, f))
+        });
+        diagnosed(&curve_of(&values, Some(NOISE_DB)))
+    };
+    let film = report_of("thin-film", &[0.8, 3.2]);
+    assert_eq!((film.effects.len(), film.base.law), (1, OTHER), "{film:#?}");
+    assert_eq!(film.effects[0].name, "thin-film");
+    let light = report_of("stray-light", &[0.01]);
+    assert_eq!(light.verdict, CurveVerdict::Unexplained, "{light:#?}");
+    assert!(light.effects.is_empty() && light.may_be.contains(&"stray-light"), "{light:#?}");
+}
+
+#[test]
 fn what_neither_a_law_nor_a_term_is_like_stays_unknown() {
     let law = law();
     let step = noisy(&INCIDENCES_DEG, 2.0, NOISE_DB, |point| {
