@@ -530,6 +530,24 @@ fn a_curve_in_other_units_is_taken_with_a_word_about_it() {
 }
 
 #[test]
+fn a_threshold_without_its_instrument_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("curve.csv"), CURVE).unwrap();
+    let add = "add --from curve.csv --name paint --class paint --kind synthetic --source model \
+               --licence CC0-1.0 --frequency 300 --threshold -77";
+    let add = || {
+        let mut command = matdb(folder.path());
+        command.args(add.split_whitespace());
+        command
+    };
+    assert!(refused(&mut add()).contains("--instrument"));
+    add().args(["--instrument", "Bench"]).assert().success();
+    let shown = matdb(folder.path()).args(["show", "paint"]).output().unwrap();
+    let shown = String::from_utf8(shown.stdout).unwrap();
+    assert!(shown.contains("threshold -77 dBm") || shown.contains("threshold −77 dBm"), "{shown}");
+}
+
+#[test]
 fn a_bare_curve_is_named_by_its_file_and_says_what_it_is_found_and_cited_by() {
     let folder = tempfile::tempdir().unwrap();
     let run = |arguments: &[&str]| {

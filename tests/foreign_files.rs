@@ -429,7 +429,11 @@ fn new_files_load_and_are_not_written_over() {
     let at = folder.path();
     let made = said(at, "new material my-wall");
     assert!(made.contains("matdb add --from my-wall"), "{made}");
-    assert!(said(at, "add --from my-wall").contains("added my-wall, revision 1"));
+    let added = matdb(at).args(["add", "--from", "my-wall"]).assert().success();
+    let output = added.get_output();
+    let [said, notes] = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text));
+    assert!(said.contains("added my-wall, revision 1"), "{said}");
+    assert!(notes.contains("`bench` has the DOI of the template"), "{notes}");
     assert!(refused(at, "new material my-wall").contains("exists already"));
     assert!(refused(at, "new material My.Wall").contains("My.Wall"));
 }

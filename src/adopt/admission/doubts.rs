@@ -6,7 +6,7 @@ use std::f64::consts::FRAC_PI_2;
 use crate::brdf::{BeyondBeam, VIEWING_RAD};
 use crate::formats::words::counted;
 use crate::material::form::licence_doubt;
-use crate::material::{Censor, Curve, Instrument, Material};
+use crate::material::{Censor, Curve, Instrument, Material, Source};
 use crate::units::{db_from_ratio, dbm_from_watts, rounded, shown};
 
 /// Highest frequency of anything that is called a radar, Hz.
@@ -22,6 +22,9 @@ const LOWEST_HZ: f64 = 1e9;
 /// radians that no such curve reaches.
 const FEWEST_ANGLES: usize = 5;
 const FEW_RADIANS: f64 = 0.5;
+
+/// DOI of the source in the template of a material, which leads nowhere.
+const TEMPLATE_DOI: &str = "10.1234/example";
 
 /// By how much a detection is below its threshold that rounding does not explain, dB.
 const WEAK_DB: f64 = 1.0;
@@ -44,6 +47,7 @@ pub fn doubts(material: &Material) -> Vec<String> {
         doubts.extend(mostly_missed(curve));
     }
     doubts.extend(beyond_beam(material));
+    doubts.extend(material.sources.iter().filter_map(of_template));
     let mut licences: Vec<&String> = material.sources.iter().flat_map(|s| &s.licence).collect();
     licences.push(&material.licence);
     licences.sort();
@@ -56,6 +60,17 @@ pub fn doubts(material: &Material) -> Vec<String> {
 fn beyond_beam(material: &Material) -> Option<String> {
     let beyond = BeyondBeam::of(&material.scattering().ok()?, VIEWING_RAD)?;
     Some(format!("`{}` {}", material.render, beyond.words(VIEWING_RAD)))
+}
+
+/// That a source is still that of the template.
+fn of_template(source: &Source) -> Option<String> {
+    let is_of_it = source.doi.as_deref() == Some(TEMPLATE_DOI);
+    is_of_it.then(|| {
+        format!(
+            "source `{}` has the DOI of the template, {TEMPLATE_DOI}; are its numbers yours?",
+            source.key
+        )
+    })
 }
 
 /// That an instrument has the frequency or the threshold of no radar.

@@ -129,6 +129,8 @@ pub(super) fn read(
     let Details { slug, class, licence, source, kind, instrument, frequency_hz, .. } = given;
     // A curve of unstated kind may be measured.
     let is_measured = kind.is_none_or(|kind| kind == SourceKind::Measured);
+    // A threshold is that of an instrument.
+    let has_instrument = instrument.is_some() || !is_measured && given.threshold_w.is_none();
     let has_threshold = !is_measured
         || given.threshold_w.is_some()
         || observations.iter().all(|row| row.threshold_sigma0.is_some());
@@ -139,7 +141,7 @@ pub(super) fn read(
         (source.is_some(), Detail::Source),
         (kind.is_some(), Detail::Kind),
         (frequency_hz.is_some(), Detail::Frequency),
-        (instrument.is_some() || !is_measured, Detail::Instrument),
+        (has_instrument, Detail::Instrument),
         (has_threshold, Detail::Threshold),
     ];
     let (Some(slug), Some(class), Some(licence), Some(title), Some(kind), Some(hz), true) = (
@@ -149,7 +151,7 @@ pub(super) fn read(
         source.clone(),
         *kind,
         *frequency_hz,
-        has_threshold && (instrument.is_some() || !is_measured),
+        has_threshold && has_instrument,
     ) else {
         return Err(missing(file, &details));
     };
