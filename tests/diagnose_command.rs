@@ -122,8 +122,8 @@ fn speckle_that_neighbours_share_is_no_effect() {
 #[test]
 fn what_the_renderer_follows_is_no_effect() {
     let corner = SCENE.replace("rotation_deg = [-15, 10, 0]", "rotation_deg = [-80, 0, 0]");
-    let several = SCENE.replace("[radar]\n", "[spot]\nrays = 64\n[radar]\n");
-    let bounce = corner.replace("[radar]\n", "[bounce]\nrays = 64\n[radar]\n");
+    let several = SCENE.replace("[radar]\n", "[spot]\nrays = 16\n[radar]\n");
+    let bounce = corner.replace("[radar]\n", "[bounce]\nrays = 32\n[radar]\n");
     for (scene, follows, effects) in [
         (&several, "finite-spot", "foreign-patch,subsurface,finite-spot"),
         (&bounce, "multi-bounce", "foreign-patch,subsurface,multi-bounce"),
@@ -216,7 +216,7 @@ fn a_bounce_has_the_side_lobes_and_phases_of_its_scene() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let corner = SCENE.replace("rotation_deg = [-15, 10, 0]", "rotation_deg = [-80, 0, 0]");
-    let bounce = "[bounce]\nrays = 64\noutside_spot_db = -10\nin_phase = true\n[radar]\n";
+    let bounce = "[bounce]\nrays = 32\noutside_spot_db = -10\nin_phase = true\n[radar]\n";
     let scene = corner.replace("[radar]\n", bounce);
     render(at, "scene", &scene);
     render(at, "drift", &format!("{scene}{DRIFT}"));
@@ -316,9 +316,9 @@ fn a_range_receiver_reads_spots_and_second_paths() {
     let receiver = "[radar.receiver]\nnoise_figure_db = 45\nfalse_alarm_probability = 1e-4\n\
                     gate_m = [7.0, 9.0]\nzero_padding = 4\n";
     let read = SCENE.replace(noise, receiver).replace("chirps = 3000", "chirps = 1500");
-    let several = read.replace("[radar]\n", "[spot]\nrays = 64\n[radar]\n");
+    let several = read.replace("[radar]\n", "[spot]\nrays = 16\n[radar]\n");
     let corner = read.replace("rotation_deg = [-15, 10, 0]", "rotation_deg = [-80, 0, 0]");
-    let bounce = corner.replace("[radar]\n", "[bounce]\nrays = 64\n[radar]\n");
+    let bounce = corner.replace("[radar]\n", "[bounce]\nrays = 32\n[radar]\n");
     let effects = ["--effects", "foreign-patch,drift"];
     for scene in [several, bounce] {
         let folder = tempfile::tempdir().unwrap();
