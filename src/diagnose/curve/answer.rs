@@ -7,7 +7,7 @@ use super::remains;
 use super::report::{ComparedLaw, CurveUnknown};
 use super::select::{Addition, Selection, State};
 use super::terms::Term;
-use super::trust::{are_trusted, is_film};
+use super::trust::are_trusted;
 
 /// How much better the declared model with terms must be than another model that explains the curve by itself, in ln p less
 /// Schwarz's penalty: odds of 150 to one. Terms that make the declared model the other one are no better.
@@ -64,9 +64,10 @@ pub(super) struct Answer {
 }
 
 impl Answer {
-    /// The first of these that leaves no more than noise: the declared model, one of the others, one of them with terms. The
-    /// declared model with an effect that is no lobe comes before one of the others where it is far better. Where a model explains all but a few
-    /// isolated levels, terms are not tried.
+    /// The first of these that leaves no more than noise: the declared model, one of the others, the declared model with
+    /// terms. The last comes before one of the others where it has an effect that is no lobe and is far better, and is no
+    /// answer where one of the others does better with terms. Where a model explains all but a few isolated levels, terms
+    /// are not tried.
     pub fn of(selection: &Selection, compared: &[Compared], terms: &[&'static dyn Term]) -> Answer {
         let (declared, others) = compared.split_at(1);
         let declared = &declared[0];
@@ -100,10 +101,11 @@ impl Answer {
             a.total_cmp(&b)
         });
         let explaining = found.iter().position(|one| one.unexplained.is_empty());
-        if let Some(best) = explaining {
+        if let Some(best) = explaining.filter(|&best| found[best].law == DECLARED) {
             return found.swap_remove(best);
         }
-        // What improves a model and leaves more than noise may stand for something else.
+        // What improves a model and leaves more than noise may stand for something else, and an effect beside another law
+        // for a law that is wrong as well.
         let mut ranking = Vec::new();
         let mut may_be = Vec::new();
         for one in found {
@@ -128,16 +130,15 @@ impl Answer {
         }
     }
 
-    /// A model with the terms that it supports. They get no name where one of them cannot be trusted, or where the noise is
-    /// unknown. Beside another law than the declared one only a film has a name: no law has fringes, but other effects may
-    /// stand for a law that is wrong as well.
+    /// A model with the terms that it supports. They get no name where one of them cannot be trusted, where the noise is
+    /// unknown, or where an effect stands beside a lobe that makes another law of the model.
     fn with_terms(selection: &Selection, one: &Compared, terms: &[&'static dyn Term]) -> Answer {
         let (after, ranking, added) = selection.run(one.state.clone(), terms);
         let least_db = selection.settings.least_named_db;
+        let shapes = added.iter().filter(|one| one.term.is_shape()).count();
         let is_trusted = selection.points.has_known_noise()
             && added.iter().all(|one| one.evidence.size_db >= least_db)
-            && (one.name == DECLARED
-                || added.iter().all(|added| is_film(added.term) && added.class.is_empty()))
+            && (shapes == 0 || shapes == added.len())
             && are_trusted(selection.points, &one.state, &after, &added);
         if !is_trusted {
             let may_be = added.iter().map(|added| added.term.name()).collect();

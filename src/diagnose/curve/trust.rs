@@ -28,13 +28,9 @@ pub(super) fn are_trusted(
     let (law, values) = after.model.numbers(&after.fitted.at);
     added.iter().zip(&values).all(|(one, values)| {
         is_inside(one.term, values)
-            && (!is_film(one.term) || fringes(points, &law, values) >= LEAST_FRINGES)
+            && (one.term.name() != ThinFilm.name()
+                || fringes(points, &law, values) >= LEAST_FRINGES)
     }) && holds_in_repeats(points, before, after)
-}
-
-/// Whether a term makes fringes.
-pub(super) fn is_film(term: &dyn Term) -> bool {
-    term.name() == ThinFilm.name()
 }
 
 /// Whether no number of a term is at a bound.

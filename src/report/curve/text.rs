@@ -33,7 +33,7 @@ pub(super) fn heading(report: &CurveReport) -> &'static str {
 
 /// The verdict in a sentence.
 pub(super) fn sentence(report: &CurveReport) -> String {
-    let names: Vec<&str> = report.effects.iter().map(|found| found.name).collect();
+    let names: Vec<String> = report.effects.iter().map(or_alike).collect();
     let names = listed(&names);
     match report.verdict {
         CurveVerdict::NoMissingEffect => {
@@ -43,10 +43,7 @@ pub(super) fn sentence(report: &CurveReport) -> String {
             "another law, {}, explains the curve within its noise, and needs no effect",
             report.base.law
         ),
-        CurveVerdict::Explained => {
-            let law = if report.base.law == "declared" { "the law" } else { report.base.law };
-            format!("{law} lacks {names}; with that, only noise is left")
-        }
+        CurveVerdict::Explained => format!("the law lacks {names}; with that, only noise is left"),
         CurveVerdict::Unexplained if report.laws.len() > 1 => {
             "the law does not explain the curve, and neither another law nor an effect that was tried \
              does: what remains is unknown"
@@ -68,12 +65,18 @@ pub(super) fn sentence(report: &CurveReport) -> String {
     }
 }
 
+/// A term, or one of those that do equally well.
+fn or_alike(found: &FoundTerm) -> String {
+    let names: Vec<&str> = [found.name].into_iter().chain(found.class.iter().copied()).collect();
+    names.join(" or ")
+}
+
 /// What improves the law and gets no name; `None` where nothing does.
 pub(super) fn may_be(report: &CurveReport) -> Option<String> {
     (!report.may_be.is_empty()).then(|| {
         format!(
             "may be {}: the law improves with that, but not to its noise, by less than 0.3 dB, not in every \
-             repeat, or with a number at its bound; a law of another shape would do the same",
+             repeat, with a number at its bound, or beside a law of another shape; such a law would do the same",
             listed(&report.may_be)
         )
     })
