@@ -4,11 +4,15 @@ import sys
 
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
+from scipy.special import gammainc
 
 import effects
+import generate
+import intervals
 import physics
 import refit
 import scan
+import score
 import targets
 from target_state import State
 
@@ -182,10 +186,11 @@ def numbers():
     """True numbers of a gain that has a stated form, and of a pose, against what they were made of."""
     base = dict(np.load("bases/groove.npz"))
     s = State(base, "groove", physics.waist_m(13.6))
-    forms = effects.stated_forms(s)
+    forms = effects.gains_of(s)
     for name, index, true in (("drift", 1, (3.0, -1.0, 0.5)), ("fov-gain", 2, (-4.0, 1.0, -2.0, 0.7, 0.3, 5.0))):
-        gain = sum(a * column for a, column in zip(true, forms[name][index].values()))
-        fitted = effects.numbers_of_gains(s, {name: gain}, s.range_m > 0)[name][index]
+        after = State(base, "groove", physics.waist_m(13.6))
+        after.gain = physics.mw(sum(a * column for a, column in zip(true, forms[name][index].values())))
+        fitted = effects.fitted_numbers(s, after, name, s.range_m > 0, 4)[index]
         say(f"{name}: numbers of a gain of that form, worst dB", np.abs(np.array(list(fitted.values())) - true).max(), 1e-4)
     v = np.random.default_rng(1).normal(size=6) * np.array([4e-3, 4e-3, 4e-3, 0.01, 0.015, 0.01])
     told = effects.pose_numbers(s, v[:3], v[3:])
@@ -200,6 +205,79 @@ def numbers():
         np.abs(moved - ((point - targets.CENTRE) @ turn.T + targets.CENTRE + v[:3])).max(), 1e-9)
     # without the foot, and round, FWHM = sd sqrt(16 ln 2) of the two-way spot; the foot adds its power below the core
     say("finite-spot: diameter of 4.8 mm two-way sd against 16 mm, mm off", abs(1e3 * effects.diameter_m(0.48, 1.0) - 16), 0.5)
+
+
+def shapes():
+    """Fits of return from below and of a grain give back what has their form; of what has another they give all or nothing."""
+    for name, effect, count, true in (
+        ("groove", "subsurface", 1, (np.log(0.01),)), ("box", "subsurface", 2, (np.log(0.003), 0.7)),
+        ("sphere", "subsurface", 2, (np.log(0.003), 1.4)), ("groove", "anisotropy", 2, (np.log(1.4), 0.9)),
+        ("cylinder", "anisotropy", 4, (np.log(1.3), -0.5, 0.4, 0.8)),
+    ):
+        before, after = untouched(name), untouched(name)
+        make, forms = effects.SHAPES[effect]
+        slope_scale, added = make(before, count).at(true)
+        after.slope_scale = after.slope_scale if slope_scale is None else slope_scale
+        after.added_mw = after.added_mw if added is None else added
+        index = [len(form) for form in forms].index(count)
+        fitted = effects.fitted_numbers(before, after, effect, audible(before), 4)[index]
+        say(f"{name}: {forms[index][0]} of {effect} of a form with {count} numbers, off as a share",
+            abs(fitted[forms[index][0]] / np.exp(true[0]) - 1), 1e-3)
+    # 0.8 + 0.3 cos(theta) where a diffuse part without exponent takes the cosine
+    before, after = untouched("sphere"), untouched("sphere")
+    effects.subsurface(after, 2.0, None)
+    flat, falling = effects.fitted_numbers(before, after, "subsurface", audible(before), 4)
+    say("sphere: sigma_v of the effect beside a refitted law, off as a share", abs(falling["sigma_v"] / 1.6e-3 - 1), 1e-3)
+    say("sphere: levels of sigma-0 that are stated with the footprint `projected`", int(flat["sigma_v"] is not None), 0)
+    before, after = untouched("groove"), untouched("groove")
+    effects.anisotropy(after, 1.0, np.random.default_rng(1))
+    fitted = effects.fitted_numbers(before, after, "anisotropy", audible(before), 4)
+    say("groove: ratios of a grain that swings too far for a straight one", sum(f["ratio"] is not None for f in fitted), 0)
+
+
+def untouched(name):
+    return State(dict(np.load(f"bases/{name}.npz")), name, physics.waist_m(13.6))
+
+
+def audible(state):
+    return state.means_mw()[0] > physics.mw(physics.THRESHOLD_DBM)
+
+
+def strengths():
+    """Effects with a strength of their own: what it says happens, and a weak one is in the data."""
+    for name in targets.MATERIALS:
+        before = untouched(name)
+        use, power = audible(before), before.means_mw()[0]
+        found = effects.calibrate(lambda: untouched(name), "angle-error", "weak", 1, 4)
+        truth = {"detections": int(use.sum()), "false_alarms": 0, "speckle": "independent", "labels": ["angle-error"], "looks": 4,
+                 "tilt_spread_db": generate.tilt_spread_db(before, found.size, use)}
+        gain = score.expected_gain(truth, "")["angle-error"]
+        say(f"{name}: gain in ln p that counts as in the data, over that of a weak angle-error, {gain:.1f}", score.IN_THE_DATA / gain, 1)
+        for strength, loss in effects.OWN_DB["compression"].items():
+            s = untouched(name)
+            effects.compression(s, effects.calibrate(lambda: untouched(name), "compression", strength, 1, 4).size, None)
+            strongest = np.argmax(power)
+            say(f"{name}: {strength} compression, what the strongest echo loses, dB off",
+                abs(physics.db(power[strongest] / s.seen_mw()[strongest]) - loss), 1e-3)
+    # against a histogram of echoes, on cells that Gamma fills alike
+    rng = np.random.default_rng(5)
+    for ratio in (0.5, 5.0):
+        echo = np.mean(np.tanh(np.sqrt(ratio * rng.exponential(size=(4, 1_000_000)))) ** 2, 0)
+        share = np.histogram(gammainc(4, 4 * echo / echo.mean()), 100, (0, 1))[0] / echo.size
+        nats = np.sum(share * np.log(np.maximum(100 * share, 1e-12)))
+        say(f"compression by {ratio}: nats of the scatter against a histogram, off as a share",
+            abs(nats / effects.ceiling_divergence(ratio, 4) - 1), 0.03)
+
+
+def laws():
+    """Numbers of the law are compared where every true effect was named."""
+    said = {"base": {"level_db": {"value": 0.0, "sd": 1.0}, "parameters": [{"name": "specular.m", "value": 0.1, "sd": 0.01}]}}
+    truth = {"law": targets.MATERIALS["groove"], "labels": ["pose", "speckle"], "level_offset_db": 0.5}
+    for names, wanted in ((["pose"], 0), (["pose", "speckle"], 2), ([], 0)):
+        answer = said | {"effects": [{"name": n, "parameters": {}} for n in names]}
+        say(f"numbers of the law beside pose and speckle, of which {' and '.join(names) or 'none'} got a name, off",
+            abs(len(list(intervals.of_laws(answer, truth))) - wanted), 0)
+    say("numbers of the law of a complete scan, off", abs(len(list(intervals.of_laws(said, truth | {"labels": []}))) - 2), 0)
 
 
 def refits():
@@ -308,6 +386,9 @@ if __name__ == "__main__":
     moves()
     scans()
     numbers()
+    shapes()
+    strengths()
+    laws()
     refits()
     spots()
     sys.exit(1 if FAILED else 0)

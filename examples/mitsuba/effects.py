@@ -2,13 +2,15 @@
 
 `apply(state, size, rng)` changes the state. Draws come from rng in the same order whatever the size."""
 
+import copy
 import functools
 from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
-from scipy.special import polygamma
+from scipy.special import gammainc, polygamma
 
 import physics
 import refit
@@ -16,9 +18,13 @@ import scan
 import targets
 
 RMS_DB = {"weak": 0.35, "moderate": 0.7, "strong": 1.4}
-# Effects that change a scatter or a count: a strength of their own.
-SPECKLE_EXCESS_DB = {"weak": 0.8, "moderate": 1.5, "strong": 2.5}  # sqrt(sd^2 - declared sd^2) of the powers in dB
-NOISE_DB = {"weak": 0.7, "moderate": 1.5, "strong": 2.5}
+# Effects that change a scatter, a count or the strongest echoes: a strength of their own, dB, which every target reaches.
+OWN_DB = {
+    "angle-error": {"weak": 0.8, "moderate": 1.3, "strong": 2.0},  # excess scatter, rms over the echoes
+    "compression": {"weak": 3.0, "moderate": 6.0, "strong": 10.0},  # what the strongest mean echo loses
+    "noise-floor": {"weak": 0.7, "moderate": 1.5, "strong": 2.5},  # noise above the declared one
+    "speckle": {"weak": 0.8, "moderate": 1.5, "strong": 2.5},  # excess scatter: sqrt(sd^2 - declared sd^2) of the powers in dB
+}
 UNKNOWN = ("spiral", "stripes", "sawtooth", "checkers")
 
 
@@ -38,7 +44,6 @@ def anisotropy(s, size, rng):
     across = np.cross(s.normal, along)
     a, b = np.sum(s.ray * along, 1), np.sum(s.ray * across, 1)
     r = np.exp(0.5 * size * 0.2)
-    s.numbers["anisotropy"] = [{"ratio": float(r**2)}]
     s.slope_scale = np.sqrt(((a / r) ** 2 + (b * r) ** 2) / (a**2 + b**2 + 1e-15))
 
 
@@ -67,7 +72,6 @@ def drift(s, size, rng):
     """A warm-up that levels off, and two bends."""
     tau, knots = rng.uniform(0.1, 0.5), rng.normal(size=5)
     path = rng.choice([-1, 1]) * np.exp(-s.share / tau) * 2 + CubicSpline(np.linspace(0, 1, 5), knots)(s.share) * 0.6
-    s.gain_db["drift"] = size * path
     s.gain = s.gain * physics.mw(size * path)
 
 
@@ -141,7 +145,6 @@ def foreign_patch(s, size, rng):
     phi, bumps = np.arctan2(d[:, 1], d[:, 0]), rng.uniform(0, 6, 2)
     outline = radius * (1 + 0.25 * np.cos(2 * phi + bumps[0]) + 0.15 * np.cos(3 * phi + bumps[1]))
     inside = (np.hypot(*d.T) < outline) & (s.piece == s.piece[np.argmin(np.hypot(*d.T))])
-    s.numbers["foreign-patch"] = [{"centre_x_m": float(centre[0]), "centre_y_m": float(centre[1])}]
     sign = rng.choice([-1, 1])
     s.slope_scale = s.slope_scale * np.where(inside, 0.8 ** min(size / 3, 1.0), 1.0)  # its lobe is wider
     s.gain = s.gain * physics.mw(size * sign * inside)
@@ -150,8 +153,7 @@ def foreign_patch(s, size, rng):
 def fov_gain(s, size, rng):
     x0, y0, power = rng.uniform(-0.06, 0.06), rng.uniform(-0.1, 0.1), rng.uniform(1.5, 2.8)
     r = np.hypot((s.aim[:, 0] - x0) / 0.25, (s.aim[:, 1] - y0) / 0.45)
-    s.gain_db["fov-gain"] = size * rng.choice([-1, 1, -1]) * (r**power + 0.2 * s.aim[:, 0] / 0.25)
-    s.gain = s.gain * physics.mw(s.gain_db["fov-gain"])
+    s.gain = s.gain * physics.mw(size * rng.choice([-1, 1, -1]) * (r**power + 0.2 * s.aim[:, 0] / 0.25))
 
 
 def motion(s, size, rng):
@@ -223,11 +225,12 @@ def few_looks(s, size, rng):
 
 def subsurface(s, size, rng):
     """Volume return, a little stronger at normal incidence than at grazing."""
-    theta = s.theta()
-    # of one level its mean, where a level of sigma-0 is one of power; of a power of the cosine that at normal incidence
-    flat = np.mean(0.8 + 0.3 * np.cos(theta), where=s.range_m > 0) if s.material["footprint"] == "paper" else None
-    s.numbers["subsurface"] = [{"sigma_v": flat and float(1e-3 * size * flat)}, {"sigma_v": 1.1e-3 * size, "cosine_power": None}]
-    s.added_mw = s.added_mw + s.scale_mw(np.where(s.range_m > 0, s.range_m, 8)) * 1e-3 * size * (0.8 + 0.3 * np.cos(theta)) / (4 * np.pi)
+    s.added_mw = s.added_mw + 1e-3 * size * (0.8 + 0.3 * np.cos(s.theta())) * unit_volume_mw(s)
+
+
+def unit_volume_mw(s):
+    """Power of a sigma-0 of 1 with the footprint `paper`; with `projected` it is this over the cosine."""
+    return s.scale_mw(np.where(s.range_m > 0, s.range_m, physics.FOCUS_M)) / (4 * np.pi)
 
 
 def thin_film(s, size, rng):
@@ -276,10 +279,9 @@ EFFECTS = {
     **{kind: functools.partial(unknown, kind=kind) for kind in UNKNOWN},
 }
 KNOWN = [n for n in EFFECTS if n not in UNKNOWN]
-# Sizes below and beyond which an effect would not be itself: a spot of less than 1 mm changes a few chirps at edges, and
-# a ceiling more than 17 dB below the strongest echo makes all echoes alike.
+# Sizes below and beyond which an effect would not be itself: a spot of less than 1 mm changes a few chirps at edges.
 START = {"finite-spot": 0.1}
-LIMIT = {"compression": 50.0, "finite-spot": 3.2, "thin-film": 1.0, "correlated-shadowing": 1.0}
+LIMIT = {"finite-spot": 3.2, "thin-film": 1.0, "correlated-shadowing": 1.0}
 # Where an effect needs a target of its own: a lobe that is seen all around, a concave place, a rough lobe.
 BASES = {"multi-bounce": ["groove"], "correlated-shadowing": ["vase"]}
 
@@ -298,7 +300,12 @@ def refitted(law, after):
     return law.fit(after.seen_mw(), use)
 
 
-def stated_forms(s):
+# What a shape must take of that which an effect leaves in ln p. Of what it does not take a report makes other effects, which
+# would shift its numbers.
+SHAPE_TAKES = 0.75
+
+
+def gains_of(s):
     """Columns, dB per unit, of the forms of a gain that a report may state, by the names of their numbers."""
     u, v = s.aim.T / 0.5
     p = 2 * s.share - 1
@@ -311,12 +318,85 @@ def stated_forms(s):
     return {name: [dict(list(all_.items())[:n]) for n in counts] for name, (all_, counts) in members.items()}
 
 
-def numbers_of_gains(before, gain_db, use):
-    """Numbers of the stated forms of each gain: a fit without noise, of the law and of the form, to the true gain."""
-    law, forms = refit.Law(before), stated_forms(before)
-    return {
-        name: [dict(zip(form, law.fit(law.power_mw * physics.mw(gain), use, form.values()).of_forms())) for form in forms[name]]
-        for name, gain in gain_db.items()}
+def of_grain(s, count):
+    """A straight grain (2 numbers: ln of the ratio, turn of the direction), or one that turns with x_t and y_t as well (4)."""
+    along = np.array([0.0, 1.0, 0.0]) - s.normal * s.normal[:, 1:2]
+    along /= np.linalg.norm(along, axis=1, keepdims=True) + 1e-12
+    a, b = np.sum(s.ray * along, 1), np.sum(s.ray * np.cross(s.normal, along), 1)
+    azimuth, (x, y) = np.arctan2(b, a), s.surface.T
+
+    def at(numbers):
+        ln_ratio, turn, by_x, by_y = [*numbers, 0, 0][:4]
+        phi = azimuth - turn - by_x * x - by_y * y
+        return np.sqrt(np.cos(phi) ** 2 * np.exp(-ln_ratio) + np.sin(phi) ** 2 * np.exp(ln_ratio)), None
+
+    turns = (-1.5, 0, 1.5) if count > 2 else (0,)
+    starts = [(0.3, k * np.pi / 4, 0, by_y)[:count] for k in range(4) for by_y in turns]
+    # a ratio below 1 is one above 1, turned by a quarter; 7 a metre are 400 degrees
+    return refit.Shape(at, starts, [0, -np.inf, -7, -7][:count], [np.log(10), np.inf, 7, 7][:count])
+
+
+def of_volume(s, count):
+    """Return from below: a level of sigma-0 (1 number: its ln), or a level times a power of the cosine (2)."""
+    cosine, unit = np.cos(s.theta()), unit_volume_mw(s)
+    if s.material["footprint"] == "projected":
+        unit = unit / cosine
+
+    def at(numbers):
+        ln_sigma, power = [*numbers, 0][:2]
+        return None, np.exp(ln_sigma) * cosine**power * unit
+
+    starts = [(np.log(level), power)[:count] for level in (1e-3, 1e-2) for power in (0.3, 1.3)[:count]]
+    return refit.Shape(at, starts, [-np.inf, 0][:count], [0, 4][:count])
+
+
+TURNING = ("ratio", "turn_deg", "turn_by_x_deg_per_m", "turn_by_y_deg_per_m")
+# Of an effect that is no gain: the shape of a form by the count of its numbers, and these by name. The first has a truth.
+SHAPES = {
+    "anisotropy": (of_grain, (TURNING[:2], TURNING)),
+    "subsurface": (of_volume, (("sigma_v",), ("sigma_v", "cosine_power"))),
+}
+# One level of sigma-0 is 1/cos(theta) in power here, so that the weakest echoes decide its fit.
+GRAZING = ("subsurface", ("sigma_v",), "projected")
+FITTED = ("drift", "fov-gain", *SHAPES)
+
+
+def fitted_numbers(before, after, name, use, looks):
+    """Numbers of each form of an effect that a report may state: a fit without noise, of law and form, to true mean powers."""
+    law, true = refit.Law(before), after.means_mw()[0]
+    if name in gains_of(before):
+        return [dict(zip(form, law.fit(true, use, form.values()).of_form())) for form in gains_of(before)[name]]
+    make, forms = SHAPES[name]
+    whole, out = law.fit(true, use).loss(looks), []
+    for names in forms:
+        fit = law.fit(true, use, shape=make(before, len(names)))
+        good = fit.loss(looks) <= (1 - SHAPE_TAKES) * whole and (name, names, before.material["footprint"]) != GRAZING
+        out.append({**dict.fromkeys(names), names[0]: float(np.exp(fit.of_form()[0])) if good else None})
+    return out
+
+
+def ceiling_divergence(ratio, looks):
+    """Kullback-Leibler divergence, nats, of an echo whose looks a ceiling compresses from the echo of Gamma with its mean.
+
+    `ratio` is the mean before over the ceiling. By cells of the power of a look, convolved over the looks."""
+    cells = 4096
+    edge = np.linspace(0, np.tanh(np.sqrt(40 * ratio)) ** 2, cells + 1)  # of the ceiling
+    look = -np.diff(np.exp(-(np.arctanh(np.minimum(np.sqrt(edge), 1 - 1e-15)) ** 2) / ratio))
+    share = np.maximum(np.fft.irfft(np.fft.rfft(look, looks * cells) ** looks, looks * cells), 0)
+    share, middle = share / share.sum(), np.arange(looks * cells) + looks / 2
+    of_gamma = np.diff(gammainc(looks, looks * np.append(middle - 0.5, middle[-1] + 0.5).clip(0) / (share @ middle)))
+    full = share > 1e-14
+    return float(share[full] @ np.log(share[full] / np.maximum(of_gamma[full], 1e-300)))
+
+
+def lost_scatter(law, after, looks):
+    """Nats in ln p by which a ceiling shows in the scatter of the echoes, beside their means."""
+    if after.ceiling_mw is None:
+        return 0.0
+    ratio = np.geomspace(1e-4, 1e2, 61)
+    nats = [ceiling_divergence(r, looks) for r in ratio]
+    seen = law.power_mw[law.power_mw > physics.mw(physics.THRESHOLD_DBM)] / after.ceiling_mw
+    return float(np.interp(np.log(seen), np.log(ratio), nats).sum())
 
 
 def looks_for(declared, excess_db):
@@ -330,12 +410,50 @@ def looks_for(declared, excess_db):
     return high
 
 
+def excess_scatter_db(state, size, count=64):
+    """Sd over tilts of this size of the mean power of each chirp, dB; `count` draws."""
+    rng, drawn, levels = np.random.default_rng(0), copy.copy(state), []
+    for _ in range(count):
+        angle_error(drawn, size, rng)
+        levels.append(physics.db(drawn.means_mw()[0]))
+    return np.std(levels, 0, ddof=1)
+
+
+def tilts_for(state, excess_db):
+    """Sd of the tilts, degrees, for this excess scatter, rms over the echoes above the threshold."""
+    use = state.means_mw()[0] > physics.mw(physics.THRESHOLD_DBM)
+
+    def rms(size):
+        return np.sqrt(np.mean(excess_scatter_db(state, size, 16)[use] ** 2))
+
+    return brentq(lambda size: rms(size) - excess_db, 0.1, 20, xtol=1e-3)
+
+
+def ceiling_for(loss_db):
+    """Strongest mean echo over a ceiling below which it loses this much."""
+
+    def lost(size):
+        return -physics.db(physics.below_ceiling(size, 1.0) / size)
+
+    return brentq(lambda size: lost(size) - loss_db, 1e-3, 1e3, xtol=1e-6)
+
+
+def own_size(state, name, goal_db, looks):
+    """Size of an effect with a strength of its own."""
+    if name == "angle-error":
+        return tilts_for(state, goal_db)
+    if name == "compression":
+        return ceiling_for(goal_db)
+    return goal_db if name == "noise-floor" else looks_for(looks, goal_db)
+
+
 def calibrate(make, name, strength, seed, looks):
     """An effect with the size for a strength."""
-    if name == "speckle":
-        return Sized(looks_for(looks, SPECKLE_EXCESS_DB[strength]), SPECKLE_EXCESS_DB[strength])
-    if name == "noise-floor":
-        return Sized(NOISE_DB[strength], 0.0)
+    if name in OWN_DB:
+        size, law, after = own_size(make(), name, OWN_DB[name][strength], looks), refit.Law(make()), make()
+        EFFECTS[name](after, size, np.random.default_rng(seed))
+        whole = refitted(law, after)
+        return Sized(float(size), whole.rms_db(), whole.loss(looks) + lost_scatter(law, after, looks))
     goal, start, law = RMS_DB[strength], START.get(name, 1e-2), refit.Law(make())
 
     def fit(size, draft=False):

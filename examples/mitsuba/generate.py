@@ -1,7 +1,6 @@
 """Generate scans with one undeclared effect, a pair, an unknown one or none. See README.md."""
 
 import argparse
-import copy
 import functools
 import glob
 import json
@@ -20,7 +19,6 @@ from target_state import State
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 LOOKS = 4
-OWN_STRENGTH = ("noise-floor", "speckle")  # reached on every target
 
 
 class Plan(NamedTuple):
@@ -203,18 +201,13 @@ def calibrated(name, plan, index):
 def reaches(name, plan):
     """Whether every effect of a plan gets as strong as wanted on a target."""
     goal = effects.RMS_DB[plan.strength]
-    left = [calibrated(name, plan, i).left_db for i, label in enumerate(plan.labels) if label not in OWN_STRENGTH]
+    left = [calibrated(name, plan, i).left_db for i, label in enumerate(plan.labels) if label not in effects.OWN_DB]
     return all(0.95 * goal <= rms <= 1.1 * goal for rms in left)
 
 
 def tilt_spread_db(state, size, use):
     """Sd over tilts of a chirp's mean power in dB: its quantiles at 0.05, 0.15, ... 0.95 over the chirps."""
-    rng, drawn = np.random.default_rng(0), copy.copy(state)
-    levels = []
-    for _ in range(64):
-        effects.angle_error(drawn, size, rng)
-        levels.append(physics.db(drawn.means_mw()[0][use]))
-    return [round(float(q), 4) for q in np.quantile(np.std(levels, 0), np.arange(0.05, 1, 0.1))]
+    return [round(float(q), 4) for q in np.quantile(effects.excess_scatter_db(state, size)[use], np.arange(0.05, 1, 0.1))]
 
 
 def range_gain(before, ranges, use):
@@ -299,12 +292,17 @@ def case(out, plan):
     write_scene(os.path.join(folder, "scene.toml"), name, slug, len(parts), plan, LOOKS)
     write_cloud(os.path.join(folder, "cloud.ply"), seen, where, state.ray, state.aim)
     hit, echo = state.range_m > 0, np.isfinite(seen) & ~alarm
-    both = echo & (before.range_m > 0)
+    fitted = {}
+    for index, label in enumerate(labels):
+        if label in effects.FITTED:  # of this effect alone
+            alone = untouched(name, plan)
+            effects.EFFECTS[label](alone, sizes[label].size, np.random.default_rng(plan.draw(index)))
+            fitted[label] = effects.fitted_numbers(before, alone, label, echo & (before.range_m > 0), LOOKS)
     truth = {
         "base": name, "labels": list(sizes), "strength": plan.strength if labels else None,
         "kind": next((n for n in labels if n in effects.UNKNOWN), None),
         "sizes": {label: found.size for label, found in sizes.items()},
-        "numbers": {**state.numbers, **effects.numbers_of_gains(before, state.gain_db, both)},
+        "numbers": state.numbers | fitted,
         "left_after_refit_db": {label: found.left_db for label, found in sizes.items()},
         "power_gain": {label: found.gain for label, found in sizes.items()},
         "reaches_strength": reaches(name, plan),

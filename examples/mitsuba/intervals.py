@@ -33,8 +33,8 @@ def of_effects(answer, truth):
 
 def of_laws(answer, truth):
     law, labels, base = truth["law"], set(truth["labels"]), answer.get("base", {})
-    if law["kind"] != "blend":
-        return
+    if law["kind"] != "blend" or not labels <= {effect["name"] for effect in answer.get("effects", [])}:
+        return  # what has no name is in the law
     true = {}
     if labels <= LOBE_STAYS:
         true["specular.m"] = law["m"]

@@ -80,16 +80,19 @@ class Law:
     @functools.cached_property
     def lobes(self):
         """Tables of the lobe after the beam, for e^x times the m, x of LN_WIDTH."""
-        return [self.convolved(functools.partial(self.rougher, width=np.exp(x))) for x in LN_WIDTH]
+        return np.array([self.convolved(functools.partial(self.rougher, width=np.exp(x))) for x in LN_WIDTH])
 
     def f(self, theta, delta, part):
         return self.at(self.wide[part], theta, delta)
 
     def at(self, table, theta, delta):
-        rows = np.array([np.interp(theta, self.angle, r) for r in table])
+        """Of a table, or of each of several."""
+        below = np.clip(np.searchsorted(self.angle, theta) - 1, 0, len(self.angle) - 2)
+        way = np.clip((theta - self.angle[below]) / (self.angle[below + 1] - self.angle[below]), 0, 1)
+        rows = table[..., below] * (1 - way) + table[..., below + 1] * way
         step = (self.delta[1:] - self.delta[:-1])[:, None]
         share = np.clip((np.clip(delta, self.delta[0], self.delta[-1]) - self.delta[:-1, None]) / step, 0, 1)
-        return np.exp(rows[0] + np.sum(share * (rows[1:] - rows[:-1]), axis=0))
+        return np.exp(rows[..., 0, :] + np.sum(share * np.diff(rows, axis=-2), axis=-2))
 
 
 def mean_noise_mw(looks):
@@ -101,6 +104,12 @@ def mean_noise_mw(looks):
 def alarm_probability(looks, noise_mw):
     cells = GATE_M / CELL_M
     return -np.expm1(cells * np.log1p(-gammaincc(looks, looks * mw(THRESHOLD_DBM) / noise_mw)))
+
+
+def below_ceiling(power, ceiling):
+    """Mean power over speckle, where each look is below a ceiling."""
+    looks, weight = np.polynomial.laguerre.laggauss(32)
+    return ceiling * np.tanh(np.sqrt(np.multiply.outer(power, looks) / ceiling)) ** 2 @ weight
 
 
 def speckle(rng, looks, w0, where, piece, shared):

@@ -32,7 +32,6 @@ class State:
         self.draft = False  # while a size is sought, an effect may do with fewer chirps and leave the others silent
         self.ceiling_mw, self.noise_gain, self.looks = None, 1.0, None
         self.numbers = {}  # of each effect: forms that a report may state, as parameters with their true numbers
-        self.gain_db = {}  # of an effect that is a gain: the gain of each chirp
         self.tilt = np.zeros(self.n)
         self.grid_x, self.grid_y = scan.grid()
         shape = (len(self.grid_y), len(self.grid_x))
@@ -87,8 +86,7 @@ class State:
         power = self.means_mw()[0]
         if self.ceiling_mw is None:
             return power
-        looks, weight = np.polynomial.laguerre.laggauss(32)
-        return self.ceiling_mw * np.tanh(np.sqrt(np.outer(power, looks) / self.ceiling_mw)) ** 2 @ weight
+        return physics.below_ceiling(power, self.ceiling_mw)
 
     def move(self, shift, turn):
         """The target moves: for each chirp a shift, m, and a turn about the centre as a rotation vector, rad.
