@@ -247,8 +247,9 @@ def smooth(rng, theta, waves):
 
 
 def sea(rng, i):
-    """Kirchhoff's limit, slope variance 0.017 of both directions together, |R|² = 0.49; every other without a noise."""
-    theta = np.radians(np.linspace(0, 18, 10 + i % 10))
+    """Kirchhoff's limit, slope variance 0.017 of both directions together, |R|² = 0.49; half of them without a noise. Every
+    other has too few angles for an answer."""
+    theta = np.radians(np.linspace(0, 18, 10 + i % 10 if i % 2 else 24 + i % 16))
     level = db(0.49 * lobe("go", theta, np.sqrt(0.017))) + 0.5 * rng.standard_normal(len(theta))
     return {"noise_db": 0.5 if i % 20 < 10 else None}, backscatter(theta, level)
 

@@ -50,6 +50,22 @@ pub(crate) fn deviations(curvature: &DMatrix<f64>) -> Vec<Option<f64>> {
     deviations
 }
 
+/// Number of the directions that the data determine, from the curvature of −ln p and the range of each unknown: those of a
+/// singular value beyond a millionth of the largest, of the unknowns that have less than their range as deviation.
+pub(crate) fn determined(curvature: &DMatrix<f64>, ranges: &[f64]) -> usize {
+    let bend = |k: usize| curvature[(k, k)];
+    let seen: Vec<usize> =
+        (0..ranges.len()).filter(|&k| bend(k) * ranges[k].powi(2) > 1.0).collect();
+    let scaled = DMatrix::from_fn(seen.len(), seen.len(), |a, b| {
+        curvature[(seen[a], seen[b])] / (bend(seen[a]) * bend(seen[b])).sqrt()
+    });
+    if seen.is_empty() || scaled.iter().any(|entry| !entry.is_finite()) {
+        return 0;
+    }
+    let values = scaled.symmetric_eigenvalues();
+    values.iter().filter(|value| **value > UNSEEN * values.max()).count()
+}
+
 impl Uncertainty {
     /// Inverts the information at a point of the search.
     pub fn new(coordinates: &Coordinates, at: &DVector<f64>, information: &DMatrix<f64>) -> Self {

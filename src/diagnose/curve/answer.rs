@@ -1,17 +1,15 @@
 //! What a curve lacks: nothing, another scattering model, terms, or something unknown.
 
 use super::evidence::RankedTerm;
-use super::goodness::{goodness, isolated};
+use super::goodness::goodness;
+use super::isolated::isolated;
 use super::points::Points;
 use super::remains;
 use super::report::{ComparedLaw, CurveUnknown};
-use super::select::{Addition, Selection, State};
+use super::select::{Addition, FAR_BETTER, Selection, State};
 use super::terms::Term;
 use super::trust::are_trusted;
 
-/// How much better the declared model with terms must be than another model that explains the curve by itself, in ln p less
-/// Schwarz's penalty: odds of 150 to one. Terms that make the declared model the other one are no better.
-const FAR_BETTER: f64 = 5.0;
 /// Name of the model that was asked for.
 pub(super) const DECLARED: &str = "declared";
 /// Other models to which terms are added, the likeliest first.
@@ -51,6 +49,16 @@ impl Compared {
     }
 }
 
+/// Models in the order of Schwarz's criterion.
+fn likeliest_first(compared: &[Compared]) -> Vec<&Compared> {
+    let mut all: Vec<&Compared> = compared.iter().collect();
+    all.sort_by(|a, b| {
+        let [a, b] = [a, b].map(|one| one.state.fitted.criterion());
+        a.total_cmp(&b)
+    });
+    all
+}
+
 /// The answer.
 pub(super) struct Answer {
     /// Name of the scattering model.
@@ -65,31 +73,30 @@ pub(super) struct Answer {
 
 impl Answer {
     /// The first of these that leaves no more than noise: the declared model, one of the others, the declared model with
-    /// terms. The last comes before one of the others where it has an effect that is no lobe and is far better, and is no
-    /// answer where one of the others does better with terms. Where a model explains all but a few isolated levels, terms
-    /// are not tried.
+    /// terms. The last comes before one of the others where it has an effect that is no lobe and is far better: terms that
+    /// make the declared model the other one are no better. It is no answer where one of the others does better with terms.
+    /// Where a model explains all but a few isolated levels, terms are not tried.
     pub fn of(selection: &Selection, compared: &[Compared], terms: &[&'static dyn Term]) -> Answer {
         let (declared, others) = compared.split_at(1);
         let declared = &declared[0];
         if declared.explains() {
             return Answer::without_terms(declared, Vec::new());
         }
-        let mut others: Vec<&Compared> = others.iter().collect();
-        others.sort_by(|a, b| {
-            let [a, b] = [a, b].map(|one| one.state.criterion());
-            a.total_cmp(&b)
-        });
+        let others = likeliest_first(others);
         if let Some(best) = others.iter().find(|one| one.explains()) {
+            let other = Answer::without_terms(best, Vec::new());
+            if !selection.points.has_known_noise() {
+                return other;
+            }
             let with = Answer::with_terms(selection, declared, terms);
-            let least = best.state.criterion() - FAR_BETTER;
+            let least = best.state.fitted.criterion() - FAR_BETTER;
             let is_effect = with.added.iter().any(|one| !one.term.is_shape());
             let is_far_better =
-                is_effect && with.unexplained.is_empty() && with.after.criterion() < least;
-            return if is_far_better { with } else { Answer::without_terms(best, Vec::new()) };
+                is_effect && with.unexplained.is_empty() && with.after.fitted.criterion() < least;
+            return if is_far_better { with } else { other };
         }
-        for one in compared {
-            let State { model, fitted, .. } = &one.state;
-            if let Some(isolated) = isolated(selection, model, fitted) {
+        for one in likeliest_first(compared) {
+            if let Some(isolated) = isolated(selection, &one.state) {
                 return Answer::without_terms(one, vec![isolated]);
             }
         }
@@ -97,7 +104,7 @@ impl Answer {
         let mut found: Vec<Answer> =
             bases.map(|one| Answer::with_terms(selection, one, terms)).collect();
         found.sort_by(|a, b| {
-            let [a, b] = [a, b].map(|one| one.after.criterion());
+            let [a, b] = [a, b].map(|one| one.after.fitted.criterion());
             a.total_cmp(&b)
         });
         let explaining = found.iter().position(|one| one.unexplained.is_empty());
@@ -133,7 +140,7 @@ impl Answer {
     /// A model with the terms that it supports. They get no name where one of them cannot be trusted, where the noise is
     /// unknown, or where an effect stands beside a lobe that makes another law of the model.
     fn with_terms(selection: &Selection, one: &Compared, terms: &[&'static dyn Term]) -> Answer {
-        let (after, ranking, added) = selection.run(one.state.clone(), terms);
+        let (after, ranking, added) = selection.run(one.name, one.state.clone(), terms);
         let least_db = selection.settings.least_named_db;
         let shapes = added.iter().filter(|one| one.term.is_shape()).count();
         let is_trusted = selection.points.has_known_noise()

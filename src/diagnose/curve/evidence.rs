@@ -5,6 +5,8 @@ use serde::Serialize;
 /// A term in one round.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RankedTerm {
+    /// Scattering model to which it was added: "declared", or the name of another.
+    pub law: &'static str,
     /// Round, from 1.
     pub round: usize,
     /// The term.

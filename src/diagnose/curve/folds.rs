@@ -52,6 +52,14 @@ impl Folds {
         Folds { block, fold, blocks, folds, width_rad, correlation_rad }
     }
 
+    /// The runs and folds of the points for which `used` is true.
+    pub fn only(&self, used: &[bool]) -> Folds {
+        let of = |all: &[usize]| {
+            all.iter().zip(used).filter(|(_, used)| **used).map(|(n, _)| *n).collect()
+        };
+        Folds { block: of(&self.block), fold: of(&self.fold), ..self.clone() }
+    }
+
     /// Sum and its standard error over runs of one number for each point.
     pub fn sum(&self, values: &[f64]) -> [f64; 2] {
         sum_by_cell(values, &self.block, self.blocks)

@@ -21,6 +21,7 @@ mod error;
 mod evidence;
 mod folds;
 mod goodness;
+mod isolated;
 mod laws;
 mod model;
 mod points;

@@ -14,7 +14,7 @@ use crate::brdf::{Brdf, Scattering};
 use crate::fit::by_parts::ByParts;
 use crate::fit::coordinates::{Coordinates, frequencies};
 use crate::fit::minimise::{Local, Minimise, Minimum, step_each};
-use crate::fit::uncertainty::deviations;
+use crate::fit::uncertainty::{determined, deviations};
 use crate::fit::{FitError, normal_share};
 use crate::units::db_from_ratio;
 
@@ -46,6 +46,16 @@ pub(super) struct Fit {
     pub log_p: f64,
     pub converged: bool,
     curvature: DMatrix<f64>,
+    /// Half of what Schwarz's criterion takes for the unknowns that the data determine.
+    penalty: f64,
+}
+
+impl Fit {
+    /// Schwarz's criterion, halved (Ann. Stat. 6 (1978) 461): of models that explain a curve the one with the least is the
+    /// best. Unknowns count as far as the data determine them.
+    pub fn criterion(&self) -> f64 {
+        self.penalty - self.log_p
+    }
 }
 
 /// The score of a model at one point.
@@ -91,6 +101,7 @@ impl Model {
         model
     }
 
+    /// The law that the model was made of, in the coordinates of the search.
     pub fn start(&self) -> DVector<f64> {
         self.coordinates.start()
     }
@@ -168,7 +179,10 @@ impl Model {
         let levels = self.levels_db(&found.at, &chosen);
         let log_p = chosen.iter().zip(&levels).map(|(p, db)| log_p(p, *db, scale_db)).sum();
         let curvature = self.local(&found.at, &bounds[1], &chosen, scale_db).curvature;
-        Fit { scale_db, log_p, converged: found.converged(), curvature, at: found.at }
+        let ranges = &bounds[1] - &bounds[0];
+        let determined = determined(&curvature, ranges.as_slice()) as f64;
+        let penalty = 0.5 * determined * (chosen.len() as f64).ln();
+        Fit { scale_db, log_p, converged: found.converged(), curvature, penalty, at: found.at }
     }
 
     /// The end of a few steps of the search from a start.

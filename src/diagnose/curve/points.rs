@@ -208,6 +208,16 @@ impl Points {
         self.noise.source != NoiseSource::Neighbours
     }
 
+    /// The points for which `used` is true.
+    pub(super) fn only(&self, used: &[bool]) -> Points {
+        let mut chosen = self.clone();
+        let mut index = 0..;
+        chosen.points.retain(|_| index.next().is_some_and(|index| used[index]));
+        let mut index = 0..;
+        chosen.repeats.retain(|_| index.next().is_some_and(|index| used[index]));
+        chosen
+    }
+
     /// One of the repeats, from 0, by itself. One level scatters more than the mean of several.
     pub(super) fn repeat(&self, number: usize) -> Points {
         let pairs = self.points.iter().zip(&self.repeats);

@@ -118,11 +118,13 @@ fn held_out_with_smooth(selection: &Selection, state: &State, covariate: &Covari
 fn correlated(selection: &Selection, state: &State) -> Option<CurveUnknown> {
     let Selection { points, settings, .. } = *selection;
     let residual_db = residuals_of(points, state, &state.fitted);
-    let pairs = points.points.iter().zip(&residual_db).filter(|(point, _)| !point.censored);
-    let squares: Vec<f64> = pairs.map(|(_, residual_db)| residual_db.powi(2)).collect();
+    let seen = points.points.iter().zip(&residual_db).filter(|(point, _)| !point.censored);
+    let squares: Vec<f64> = seen.map(|(_, residual_db)| residual_db.powi(2)).collect();
     let square = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
     let shared = autocorrelation(points, &residual_db, 1);
-    let p_value = normal_share(-shared * (squares.len() as f64).sqrt());
+    let pairs = points.neighbours().filter(|pair| pair.iter().all(|point| !point.censored));
+    let pairs = pairs.count() as f64;
+    let p_value = normal_share(-shared * pairs.sqrt());
     let strength_db = (shared.max(0.0) * square).sqrt();
     let is_found = p_value <= settings.family_error && strength_db >= least_size_db(selection);
     is_found.then(|| unknown("neighbouring angles", strength_db, p_value))

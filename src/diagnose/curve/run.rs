@@ -6,7 +6,7 @@ use super::answer::{Answer, Compared, DECLARED};
 use super::error::CurveDiagnoseError;
 use super::folds::Folds;
 use super::laws::other_laws;
-use super::model::{Model, Score};
+use super::model::{Fit, Model, Score};
 use super::points::{Contradiction, Points, f_per_sr};
 use super::remains;
 use super::report::{
@@ -46,9 +46,7 @@ impl CurveDiagnosis {
         if !(noise_db > 0.0 && noise_db <= 100.0) {
             return Err(CurveDiagnoseError::Noise { noise_db });
         }
-        let model = Model::new(&self.first_fit(points, law)?, points.kind)?;
-        let all = vec![true; points.points.len()];
-        let fitted = model.fit(points, &all, &model.start());
+        let (model, fitted) = self.fitted(points, law)?;
         let levels_db = model.levels_db(&fitted.at, &points.points);
         let rough_db = remains::without_smooth(points, &levels_db, fitted.scale_db);
         let folds = Folds::new(points, &rough_db, self.folds, self.seed);
@@ -66,8 +64,7 @@ impl CurveDiagnosis {
         let mut compared = vec![Compared::new(&selection, DECLARED, before)];
         if !compared[0].explains() {
             let others = other_laws(law).into_par_iter().filter_map(|(name, law)| {
-                let model = Model::new(&self.first_fit(points, &law).ok()?, points.kind).ok()?;
-                let fitted = model.fit(points, &all, &model.start());
+                let (model, fitted) = self.fitted(points, &law).ok()?;
                 Some(Compared::new(&selection, name, selection.state(model, fitted)))
             });
             compared.extend(others.collect::<Vec<Compared>>());
@@ -76,15 +73,20 @@ impl CurveDiagnosis {
         Ok(self.report(&selection, &compared, answer))
     }
 
-    /// The scattering model by least squares in dB of all detections, from several starts.
-    fn first_fit(&self, points: &Points, law: &Brdf) -> Result<Brdf, CurveDiagnoseError> {
+    /// The scattering model with its fit, which starts at the one by least squares in dB of all detections, from several
+    /// starts.
+    fn fitted(&self, points: &Points, law: &Brdf) -> Result<(Model, Fit), CurveDiagnoseError> {
         let samples: Vec<Sample> = points
             .points
             .iter()
             .filter(|point| !point.censored)
             .map(|point| Sample { i: point.i, o: point.o, f_per_sr: f_per_sr(point) })
             .collect();
-        Ok(Bistatic { seed: self.seed, ..Bistatic::default() }.run(law, &samples)?.model)
+        let found = Bistatic { seed: self.seed, ..Bistatic::default() }.run(law, &samples)?.model;
+        let all = vec![true; points.points.len()];
+        let (model, first) = (Model::new(law, points.kind)?, Model::new(&found, points.kind)?);
+        let fitted = model.fit(points, &all, &first.start());
+        Ok((model, fitted))
     }
 
     fn report(&self, selection: &Selection, compared: &[Compared], answer: Answer) -> CurveReport {

@@ -21,6 +21,9 @@ const SHORT_LIST: usize = 5;
 const MOVED: f64 = std::f64::consts::LN_2;
 /// Difference in held-out ln p below which two terms predict equally well; so does less than one standard error.
 const SAME: f64 = 2.0;
+/// How much better a model must be than another that explains the curve as well, in ln p less Schwarz's penalty: odds of 150
+/// to one.
+pub(super) const FAR_BETTER: f64 = 5.0;
 
 /// A model, its fit to everything, and its fits to everything but a fold.
 #[derive(Clone)]
@@ -31,14 +34,6 @@ pub(super) struct State {
     pub of_fold: Vec<Fit>,
     /// Score of every point by the fit without its fold.
     pub held_out: Vec<Score>,
-}
-
-impl State {
-    /// Schwarz's criterion, halved (Ann. Stat. 6 (1978) 461): of models that explain a curve the one with the least is the
-    /// best.
-    pub fn criterion(&self) -> f64 {
-        0.5 * self.model.unknowns() as f64 * (self.held_out.len() as f64).ln() - self.fitted.log_p
-    }
 }
 
 /// A term that was added.
@@ -56,6 +51,14 @@ pub(super) struct Selection<'a> {
     pub settings: &'a CurveDiagnosis,
     /// Whether a model leaves no more than a known noise.
     pub leaves_nothing: &'a (dyn Fn(&Selection, &State) -> bool + Sync),
+}
+
+/// A round of trials: its number, from 1, and the model to which a term is added.
+#[derive(Clone, Copy)]
+struct Round<'a> {
+    law: &'static str,
+    number: usize,
+    state: &'a State,
 }
 
 /// A fit of one more term.
@@ -91,9 +94,10 @@ impl Selection<'_> {
         State { model, fitted, of_fold, held_out }
     }
 
-    /// Adds terms while one is supported, and something is left.
+    /// Adds terms to the scattering model of this name while one is supported, and something is left.
     pub fn run(
         &self,
+        law: &'static str,
         mut state: State,
         terms: &[&'static dyn Term],
     ) -> (State, Vec<RankedTerm>, Vec<Addition>) {
@@ -101,11 +105,13 @@ impl Selection<'_> {
         for round in 1..=self.settings.most_terms + 1 {
             let mut left = terms.to_vec();
             left.retain(|term| added.iter().all(|added| added.term.name() != term.name()));
-            let mut trials = self.trials(round, &state, &left);
+            let mut trials = self.trials(Round { law, number: round, state: &state }, &left);
             let best = self.best(&trials).filter(|_| round <= self.settings.most_terms);
             let is_last = best.is_some_and(|index| trials[index].leaves_nothing);
             let next = best.and_then(|index| {
                 let class = self.class(&trials, index);
+                let name = trials[index].ranked.name;
+                added.iter_mut().for_each(|one| one.class.retain(|alike| *alike != name));
                 let (addition, next) = trials[index].accept(class);
                 added.push(addition);
                 next
@@ -121,9 +127,10 @@ impl Selection<'_> {
     }
 
     /// Every term with the model, best gain first; the first few with their held-out scores.
-    fn trials(&self, round: usize, state: &State, terms: &[&'static dyn Term]) -> Vec<Trial> {
+    fn trials(&self, round: Round, terms: &[&'static dyn Term]) -> Vec<Trial> {
+        let state = round.state;
         let mut trials: Vec<Trial> =
-            terms.par_iter().map(|term| self.trial(round, state, *term)).collect();
+            terms.par_iter().map(|term| self.trial(round, *term)).collect();
         trials.sort_by(|a, b| b.ranked.gain.total_cmp(&a.ranked.gain));
         let least_gain = self.settings.least_gain;
         trials.par_iter_mut().take(SHORT_LIST).for_each(|trial| self.search_again(state, trial));
@@ -138,7 +145,8 @@ impl Selection<'_> {
     }
 
     /// A term fitted from its best starts.
-    fn trial(&self, round: usize, state: &State, term: &'static dyn Term) -> Trial {
+    fn trial(&self, round: Round, term: &'static dyn Term) -> Trial {
+        let Round { law, number, state } = round;
         let points = self.points;
         let all = vec![true; points.points.len()];
         let model = state.model.with(term);
@@ -160,7 +168,8 @@ impl Selection<'_> {
             model.fit(points, &all, &joined(&state.fitted.at, term, &absent))
         });
         let ranked = RankedTerm {
-            round,
+            law,
+            round: number,
             name: term.name(),
             numbers: term.parameters().len(),
             gain: fitted.log_p - state.fitted.log_p,
@@ -181,15 +190,22 @@ impl Selection<'_> {
         (squares / before.len().max(1) as f64).sqrt()
     }
 
-    /// Searches a term once more from laws beside the one found: the law without the term may lie in another valley.
+    /// Searches a term once more from the law as declared and from laws beside the one found: the law without the term may
+    /// lie in another valley, or at a bound where its numbers do nothing.
     fn search_again(&self, state: &State, trial: &mut Trial) {
         let all = vec![true; self.points.points.len()];
         let coordinates = &trial.model.coordinates;
         let (lower, upper, numbers) =
             (coordinates.lower(), coordinates.upper(), 0..coordinates.len());
-        for (number, step) in numbers.flat_map(|number| [(number, MOVED), (number, -MOVED)]) {
+        let beside = numbers.flat_map(|number| [(number, MOVED), (number, -MOVED)]);
+        for moved in [None].into_iter().chain(beside.map(Some)) {
             let mut start = trial.fitted.at.clone();
-            start[number] = (start[number] + step).clamp(lower[number], upper[number]);
+            match moved {
+                None => start.rows_mut(0, coordinates.len()).copy_from(&trial.model.start()),
+                Some((number, step)) => {
+                    start[number] = (start[number] + step).clamp(lower[number], upper[number]);
+                }
+            }
             let found = trial.model.fit(self.points, &all, &start);
             if found.log_p > trial.fitted.log_p {
                 trial.ranked.gain += found.log_p - trial.fitted.log_p;
@@ -207,7 +223,7 @@ impl Selection<'_> {
             let [a, b] = [a, b].map(|index| &trials[index]);
             a.leaves_nothing.cmp(&b.leaves_nothing).then_with(|| {
                 if a.leaves_nothing {
-                    b.criterion().total_cmp(&a.criterion())
+                    b.fitted.criterion().total_cmp(&a.fitted.criterion())
                 } else {
                     a.held_out_gain().total_cmp(&b.held_out_gain())
                 }
@@ -223,27 +239,26 @@ impl Selection<'_> {
             && trial.ranked.size_db >= self.settings.least_size_db
     }
 
-    /// Other supported terms that predict held-out angles as well as the best, and leave as little.
+    /// Other supported terms that do as well as the best.
     fn class(&self, trials: &[Trial], best: usize) -> Vec<&'static str> {
-        let Some((best_leaves_nothing, winner)) =
-            trials.get(best).and_then(|trial| Some((trial.leaves_nothing, trial.state.as_ref()?)))
-        else {
-            return Vec::new();
-        };
-        let mut class = Vec::new();
-        for (index, trial) in trials.iter().enumerate() {
-            if index != best
-                && self.is_supported(trial)
-                && trial.leaves_nothing == best_leaves_nothing
-                && let Some(state) = &trial.state
-            {
-                let [behind, se] = self.gain(&state.held_out, &winner.held_out);
-                if behind <= SAME.max(se) {
-                    class.push(trial.ranked.name);
-                }
-            }
+        let others = trials.iter().enumerate().filter(|(index, _)| *index != best);
+        let supported = others.filter(|(_, trial)| self.is_supported(trial));
+        let alike = supported.filter(|(_, trial)| self.is_alike(trial, &trials[best]));
+        alike.map(|(_, trial)| trial.ranked.name).collect()
+    }
+
+    /// Whether a term does as well as the best: where that leaves nothing, it leaves nothing either and is not far less
+    /// likely, else it predicts held-out angles as well.
+    fn is_alike(&self, trial: &Trial, best: &Trial) -> bool {
+        if best.leaves_nothing {
+            let behind = trial.fitted.criterion() - best.fitted.criterion();
+            return trial.leaves_nothing && behind < FAR_BETTER;
         }
-        class
+        let states = trial.state.as_ref().zip(best.state.as_ref());
+        states.is_some_and(|(state, best)| {
+            let [behind, se] = self.gain(&state.held_out, &best.held_out);
+            behind <= SAME.max(se)
+        })
     }
 
     /// Gain in ln p of held-out angles and its standard error over runs.
@@ -257,11 +272,6 @@ impl Trial {
     /// Gain in ln p of held-out angles; 0 where it is unknown.
     fn held_out_gain(&self) -> f64 {
         self.ranked.held_out.map_or(0.0, |[gain, _]| gain)
-    }
-
-    /// Schwarz's criterion, infinite where the term was not judged.
-    fn criterion(&self) -> f64 {
-        self.state.as_ref().map_or(f64::INFINITY, State::criterion)
     }
 
     /// Accepts the term: the addition, and the model with it.

@@ -8,6 +8,7 @@ use super::model::Model;
 use super::testing::{curve_of, noisy};
 use super::*;
 use crate::brdf::{Brdf, KirchhoffGo, Scattering};
+use crate::fit;
 use crate::formats::ColumnNames;
 use crate::material::file::in_plane::InPlane;
 use crate::material::file::points;
@@ -28,8 +29,13 @@ fn law() -> Brdf {
 
 /// A curve of the law with a term of these numbers.
 fn values_with(name: &str, numbers: &[f64]) -> Vec<InPlane> {
+    values_of(name, numbers, NOISE_DB)
+}
+
+/// The same with this noise, dB.
+fn values_of(name: &str, numbers: &[f64], noise_db: f64) -> Vec<InPlane> {
     let (law, term) = (law(), term(name));
-    noisy(&INCIDENCES_DEG, 2.0, NOISE_DB, |point| {
+    noisy(&INCIDENCES_DEG, 2.0, noise_db, |point| {
         let f = law.f_per_sr(point.i, point.o);
         db_from_ratio(term.map_or(f, |term| term.scatter(numbers, &law, point, f)))
     })
@@ -206,6 +212,38 @@ fn what_neither_a_law_nor_a_term_is_like_stays_unknown() {
 }
 
 #[test]
+fn an_effect_that_changes_little_has_no_name() {
+    let report = |light: f64| {
+        let values = values_of("stray-light", &[light], 0.05);
+        diagnosed(&curve_of(&values, Some(0.05)))
+    };
+    let (little, more) = (report(LITTLE), report(3.0 * LITTLE));
+    assert_eq!(little.verdict, CurveVerdict::Unexplained, "{little:#?}");
+    assert!(little.effects.is_empty() && little.may_be.contains(&"stray-light"), "{little:#?}");
+    let size_db = little.ranking.iter().find(|one| one.accepted).unwrap().size_db;
+    assert!((0.1..0.3).contains(&size_db), "{size_db}");
+    assert_eq!(more.effects[0].name, "stray-light", "{more:#?}");
+}
+const LITTLE: f64 = 0.001;
+
+#[test]
+fn numbers_that_the_data_do_not_determine_do_not_count() {
+    // An exponential correlation of k·s = 1.39 and k·l = 29.1: its permittivity and beam act only together.
+    let mut laws = laws::other_laws(&base_law());
+    laws.retain(|(name, _)| *name == "kirchhoff with exponential correlation");
+    let (name, mut law) = laws.pop().unwrap();
+    law.set_parameter("rms_height_m", 2.217e-4);
+    law.set_parameter("correlation_length_m", 4.632e-3);
+    let points = backscatter_of(0.3, 100, 0.1, |theta_rad| law.sigma0(theta_rad));
+    let report = diagnosed(&points);
+    assert_eq!((report.verdict, report.base.law), (CurveVerdict::AnotherLaw, name), "{report:#?}");
+    let fitted = Model::new(&law, Kind::Backscatter).unwrap();
+    let fit = fitted.fit(&points, &vec![true; 100], &fitted.start());
+    let counted = (fit.criterion() + fit.log_p) / (0.5 * 100f64.ln());
+    assert!(counted > 1.5 && counted < fitted.unknowns() as f64 - 0.5, "{counted}");
+}
+
+#[test]
 fn isolated_peaks_are_not_taken_for_an_effect() {
     // A grating on a flat base: peaks at sin θ = n·λ/2d, a degree wide.
     let grating = |theta_rad: f64| {
@@ -223,6 +261,17 @@ fn isolated_peaks_are_not_taken_for_an_effect() {
         let nearest = peaks.at_deg.iter().map(|[i, _]| (i - peak_deg).abs()).fold(90.0, f64::min);
         assert!(nearest < 1.0, "{peaks:?}");
     }
+}
+
+#[test]
+fn one_bad_level_is_not_all_that_remains_of_a_film() {
+    let mut values = values_with("thin-film", &[0.8, 3.2]);
+    values[100].f_per_sr *= ratio_from_db(5.0);
+    let report = diagnosed(&curve_of(&values, Some(NOISE_DB)));
+    assert_eq!(report.verdict, CurveVerdict::Unexplained, "{report:#?}");
+    let is_isolated = |found: &CurveUnknown| found.covariate == "isolated angles";
+    assert!(!report.unexplained.iter().all(is_isolated), "{report:#?}");
+    assert!(report.may_be.contains(&"thin-film"), "{report:#?}");
 }
 
 #[test]
@@ -290,6 +339,39 @@ fn a_lobe_that_one_run_holds_is_named_where_nothing_is_left_with_it() {
     assert!(names.any(|name| name == "instrument-lobe"), "{report:#?}");
     let evidence = &found.evidence;
     assert!(evidence.held_out_gain < 2.0 * evidence.held_out_se, "{evidence:?}");
+}
+
+#[test]
+fn effects_that_leave_nothing_alike_are_named_together() {
+    let law = Brdf::KirchhoffGo(KirchhoffGo { rms_slope: 0.967, eps_real: 9.0, eps_imag: 0.0 });
+    let points = backscatter_with(&law, "stray-light", &[3e-6], [1.356, 0.1]);
+    let report = CurveDiagnosis::default().run(&points, &law, &terms()).unwrap();
+    assert_eq!(report.verdict, CurveVerdict::Explained, "{report:#?}");
+    let found = &report.effects[0];
+    let mut names: Vec<&str> =
+        [found.name].into_iter().chain(found.class.iter().copied()).collect();
+    names.sort_unstable();
+    assert_eq!(names, ["second-lobe", "stray-light", "subsurface"], "{report:#?}");
+}
+
+#[test]
+fn a_level_at_its_bound_does_not_hide_what_is_added() {
+    // Without the subsurface return the best mixture has no diffuse part.
+    let mut law = fit::model("mixture-ggx").unwrap();
+    for (path, value) in [
+        ("k", 0.5),
+        ("specular.f_lambda", 0.138),
+        ("specular.m", 0.229),
+        ("diffuse.r_s", 0.0704),
+        ("diffuse.alpha", 10.46),
+    ] {
+        assert!(law.set_parameter(path, value), "{path}");
+    }
+    let points = backscatter_with(&law, "subsurface", &[0.00285], [1.33, 0.1]);
+    let declared = fit::model("mixture-ggx").unwrap();
+    let report = CurveDiagnosis::default().run(&points, &declared, &terms()).unwrap();
+    let found: Vec<&str> = report.effects.iter().map(|found| found.name).collect();
+    assert_eq!(found, ["subsurface"], "{report:#?}");
 }
 
 #[test]

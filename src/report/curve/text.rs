@@ -75,8 +75,9 @@ fn or_alike(found: &FoundTerm) -> String {
 pub(super) fn may_be(report: &CurveReport) -> Option<String> {
     (!report.may_be.is_empty()).then(|| {
         format!(
-            "may be {}: the law improves with that, but not to its noise, by less than 0.3 dB, not in every \
-             repeat, with a number at its bound, or beside a law of another shape; such a law would do the same",
+            "may be {}: a law improves with that, but not to its noise, by less than 0.3 dB, not in every \
+             repeat, with a number at its bound, or only beside another law or lobe; a law of another shape would \
+             do the same",
             listed(&report.may_be)
         )
     })
