@@ -153,3 +153,22 @@ fn what_means_nothing_is_refused_in_a_sentence() {
         assert!(!at.join("more").exists());
     }
 }
+
+#[test]
+fn a_level_at_a_right_angle_is_left_out_and_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut text = "theta_deg,sigma0_db\n".to_owned();
+    for k in 0..=45u32 {
+        let theta_deg = 2.0 * f64::from(k);
+        let level_db = 20.0 * theta_deg.to_radians().cos().max(1e-4).log10();
+        text += &format!("{theta_deg},{:.2}\n", level_db + 0.1 * f64::from(k % 3));
+    }
+    fs::write(at.join("curve.csv"), text).unwrap();
+    let command = ["-q", "diagnose", "--curve", "curve.csv", "--noise-db", "0.2", "-o", "out"];
+    let output = matdb(at).args(command).output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{said}");
+    assert!(said.contains("levels at 89.9° or more are not used: 1"), "{said}");
+    assert_eq!(json(&at.join("out/report.json"))["curve"]["points"], 45);
+}

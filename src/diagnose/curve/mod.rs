@@ -41,7 +41,7 @@ mod trust;
 pub use error::CurveDiagnoseError;
 pub use evidence::{CurveEvidence, RankedTerm};
 pub use laws::base_law;
-pub use points::{Kind, Noise, NoiseSource, Point, Points};
+pub use points::{Kind, Noise, NoiseSource, Point, Points, is_grazing};
 pub use report::{
     ComparedLaw, CurveBase, CurveBaseValue, CurveBeforeAfter, CurveErrors, CurveFacts, CurveReport,
     CurveRow, CurveUnknown, CurveVerdict, FoundTerm,

@@ -99,6 +99,8 @@ pub(super) struct Contradiction {
     pub scatter_db: f64,
 }
 
+/// Angle of incidence from which on σ⁰ does not give f, rad.
+const GRAZING_RAD: f64 = 1.569;
 /// Least noise of a file, dB: files round.
 const LEAST_NOISE_DB: f64 = 0.01;
 /// Quantile of the deviations that gives the noise: twice as precise as the median, and insensitive to a few bends.
@@ -138,9 +140,8 @@ impl Points {
         rows: impl Iterator<Item = (&'a Observation, Option<f64>)>,
         noise_db: Option<f64>,
     ) -> Points {
-        const GRAZING_RAD: f64 = 1.569;
         let mut points: Group = rows
-            .filter(|(row, _)| row.theta_i_rad < GRAZING_RAD)
+            .filter(|(row, _)| !is_grazing(row))
             .filter_map(|(row, sd_db)| {
                 let theta_rad = row.theta_i_rad;
                 let i = Direction::from_angles(theta_rad, PI);
@@ -264,6 +265,11 @@ impl Points {
             _ => None,
         })
     }
+}
+
+/// Whether a row of backscatter is left out, since σ⁰ does not give f there.
+pub fn is_grazing(row: &Observation) -> bool {
+    row.is_retro() && row.theta_i_rad >= GRAZING_RAD
 }
 
 /// An angle as a key that rounding does not change.

@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use crate::brdf::Brdf;
-use crate::diagnose::curve::{CurveDiagnosis, CurveReport, Points, Term, base_law};
+use crate::diagnose::curve::{
+    CurveDiagnosis, CurveReport, Kind, Points, Term, base_law, is_grazing,
+};
 use crate::error::Error;
 use crate::formats::{ColumnNames, FormatError};
 use crate::material::file::in_plane::{is_bsdf, read_bsdf};
@@ -73,6 +75,10 @@ impl CurveRequest<'_> {
             let place = format!("point {row} (from 1)");
             FormatError::at(place, "it is out of the plane of incidence", "leave such points out")
         })?;
+        let grazing = curve.observations.iter().filter(|row| is_grazing(row)).count();
+        if grazing > 0 && points.kind == Kind::Backscatter {
+            notices.push(format!("levels at 89.9° or more are not used: {grazing}"));
+        }
         Ok((points, notices))
     }
 }
