@@ -219,6 +219,10 @@ fn clouds_that_cannot_be_used() {
         (&["--region", "bdy"][..], &["no region `bdy`", "body"][..]),
         (&["--pose", "1,2"], &["`1,2` is not a pose"]),
         (&["--edge-margin", "7"], &["--edge-margin 7"]),
+        (
+            &["--pose", "auto", "--keep-pose"],
+            &["--keep-pose has no pose to keep", "leave out --pose auto"],
+        ),
         (&["--save", "no-such", "--kind", "measured", "--source", "x"], &["no-such"]),
         (
             &["--save", "ptfe", "--kind", "measured", "--source", "x"],

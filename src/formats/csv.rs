@@ -486,7 +486,17 @@ mod tests {
         let table = read("theta_deg\n1\nnan\n").unwrap();
         let refused = table.required_number(1, "theta_deg").unwrap_err().to_string();
         assert!(refused.starts_with("line 3, column theta_deg: `nan`"), "{refused}");
+        for order in [u16::to_le_bytes, u16::to_be_bytes] {
+            let text = "\u{feff}theta_deg\n1\n".encode_utf16();
+            let bytes: Vec<u8> = text.flat_map(order).collect();
+            let refused = Table::parse(&bytes, Names::InFirstLine).unwrap_err().to_string();
+            assert!(
+                refused.contains("UTF-16") && refused.contains("save it as UTF-8"),
+                "{refused}"
+            );
+        }
     }
+
     #[test]
     fn cells_are_separated_by_what_the_header_has() {
         for text in [

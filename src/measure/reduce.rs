@@ -459,6 +459,19 @@ mod tests {
     }
 
     #[test]
+    fn relative_levels_hold_no_watts() {
+        let row = |sigma0: f64| Observation {
+            power_w: Some(sigma0 * 1e-9),
+            ..Observation::backscatter(0.3, Some(sigma0), Some(0.02))
+        };
+        let mut rows = [row(8.0), row(2.0)];
+        from_strongest(&mut rows);
+        assert_eq!(rows.map(|row| row.sigma0), [Some(1.0), Some(0.25)]);
+        assert_eq!(rows.map(|row| row.threshold_sigma0), [Some(0.0025); 2]);
+        assert_eq!(rows.map(|row| row.power_w), [None; 2]);
+    }
+
+    #[test]
     fn the_curve_is_the_law_that_made_the_cloud() {
         let reduced = reduce(&mannequin(2e-3, 1), Reduction::default()).unwrap();
         let mut off_db: Vec<f64> = reduced
