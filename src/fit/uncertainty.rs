@@ -59,7 +59,10 @@ pub(crate) fn determined(curvature: &DMatrix<f64>, ranges: &[f64]) -> usize {
     let scaled = DMatrix::from_fn(seen.len(), seen.len(), |a, b| {
         curvature[(seen[a], seen[b])] / (bend(seen[a]) * bend(seen[b])).sqrt()
     });
-    if seen.is_empty() || scaled.iter().any(|entry| !entry.is_finite()) {
+    if scaled.iter().any(|entry| !entry.is_finite()) {
+        return ranges.len();
+    }
+    if seen.is_empty() {
         return 0;
     }
     let values = scaled.symmetric_eigenvalues();
@@ -176,4 +179,24 @@ pub(super) fn observed_information(
         information.set_column(index, &(change / (high[index] - low[index])));
     }
     0.5 * (&information + information.transpose())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unknown_counts_where_the_data_determine_it() {
+        let of = |rows: [[f64; 2]; 2], ranges: [f64; 2]| {
+            determined(&DMatrix::from_fn(2, 2, |a, b| rows[a][b]), &ranges)
+        };
+        assert_eq!(of([[4.0, 0.0], [0.0, 9.0]], [1.0; 2]), 2);
+        // The same change by either; wider than its range; held by its bounds.
+        assert_eq!(of([[4.0, 6.0], [6.0, 9.0]], [1.0; 2]), 1);
+        assert_eq!(of([[4.0, 0.0], [0.0, 0.5]], [1.0; 2]), 1);
+        assert_eq!(of([[4.0, 0.0], [0.0, 9.0]], [1.0, 0.0]), 1);
+        assert_eq!(of([[0.0; 2]; 2], [1.0; 2]), 0);
+        // Where nothing is known of them, all count.
+        assert_eq!(of([[4.0, f64::INFINITY], [f64::INFINITY, 9.0]], [1.0; 2]), 2);
+    }
 }

@@ -35,7 +35,6 @@ impl Compared {
 
     pub fn in_report(&self, points: &Points) -> ComparedLaw {
         let State { model, fitted, .. } = &self.state;
-        let all = vec![true; points.points.len()];
         let residual_db = points.residuals_db(&model.levels_db(&fitted.at, &points.points));
         let seen = points.points.iter().zip(residual_db).filter(|(point, _)| !point.censored);
         let squares: Vec<f64> = seen.map(|(_, residual)| residual * residual).collect();
@@ -43,7 +42,7 @@ impl Compared {
             name: self.name,
             rms_db: (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt(),
             numbers: model.unknowns(),
-            p_value: goodness(points, model, fitted, &all),
+            p_value: goodness(points, &self.state),
             explains: self.explains(),
         }
     }
@@ -69,6 +68,8 @@ pub(super) struct Answer {
     pub added: Vec<Addition>,
     pub may_be: Vec<&'static str>,
     pub unexplained: Vec<CurveUnknown>,
+    /// Schwarz's criterion where no more than noise remains with the terms, be they trusted or not; else infinite.
+    explains_at: f64,
 }
 
 impl Answer {
@@ -96,27 +97,24 @@ impl Answer {
             return if is_far_better { with } else { other };
         }
         for one in likeliest_first(compared) {
-            if let Some(isolated) = isolated(selection, &one.state) {
-                return Answer::without_terms(one, vec![isolated]);
+            if let Some((isolated, fitted)) = isolated(selection, &one.state) {
+                let answer = Answer::without_terms(one, vec![isolated]);
+                return Answer { after: State { fitted, ..answer.after }, ..answer };
             }
         }
         let bases = [declared].into_iter().chain(others.into_iter().take(MOST_OTHERS));
         let mut found: Vec<Answer> =
             bases.map(|one| Answer::with_terms(selection, one, terms)).collect();
-        found.sort_by(|a, b| {
-            let [a, b] = [a, b].map(|one| one.after.fitted.criterion());
-            a.total_cmp(&b)
-        });
-        let explaining = found.iter().position(|one| one.unexplained.is_empty());
-        if let Some(best) = explaining.filter(|&best| found[best].law == DECLARED) {
-            return found.swap_remove(best);
+        let is_first = found.iter().all(|one| one.explains_at >= found[0].explains_at);
+        if found[0].unexplained.is_empty() && is_first {
+            return found.swap_remove(0);
         }
         // What improves a model and leaves more than noise may stand for something else, and an effect beside another law
         // for a law that is wrong as well.
         let mut ranking = Vec::new();
         let mut may_be = Vec::new();
         for one in found {
-            may_be.extend(one.added.iter().map(|added| added.term.name()));
+            may_be.extend(one.added.iter().flat_map(Addition::names));
             may_be.extend(one.may_be);
             ranking.extend(one.ranking);
         }
@@ -134,6 +132,7 @@ impl Answer {
             added: Vec::new(),
             may_be: Vec::new(),
             unexplained,
+            explains_at: f64::INFINITY,
         }
     }
 
@@ -141,17 +140,21 @@ impl Answer {
     /// unknown, or where an effect stands beside a lobe that makes another law of the model.
     fn with_terms(selection: &Selection, one: &Compared, terms: &[&'static dyn Term]) -> Answer {
         let (after, ranking, added) = selection.run(one.name, one.state.clone(), terms);
+        let unexplained = remains::unexplained(selection, &after);
+        let explains_at =
+            if unexplained.is_empty() { after.fitted.criterion() } else { f64::INFINITY };
         let least_db = selection.settings.least_named_db;
         let shapes = added.iter().filter(|one| one.term.is_shape()).count();
         let is_trusted = selection.points.has_known_noise()
             && added.iter().all(|one| one.evidence.size_db >= least_db)
             && (shapes == 0 || shapes == added.len())
-            && are_trusted(selection.points, &one.state, &after, &added);
+            && are_trusted(selection.points, least_db, &one.state, &after, &added);
         if !is_trusted {
-            let may_be = added.iter().map(|added| added.term.name()).collect();
-            return Answer { ranking, may_be, ..Answer::without_terms(one, one.left.clone()) };
+            let may_be = added.iter().flat_map(Addition::names).collect();
+            let answer = Answer::without_terms(one, one.left.clone());
+            return Answer { ranking, may_be, explains_at, ..answer };
         }
-        let unexplained = remains::unexplained(selection, &after);
-        Answer { law: one.name, after, ranking, added, may_be: Vec::new(), unexplained }
+        let may_be = Vec::new();
+        Answer { law: one.name, after, ranking, added, may_be, unexplained, explains_at }
     }
 }

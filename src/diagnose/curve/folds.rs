@@ -72,7 +72,8 @@ fn runs(points: &Points, width_rad: f64) -> (Vec<usize>, usize) {
     let mut first = 0;
     for scan in points.points.chunk_by(|a, b| a.scan == b.scan) {
         let ends = [scan.first(), scan.last()].map(|p| p.map_or(0.0, |p| points.angle_rad(p)));
-        let count = ((ends[1] - ends[0]) / width_rad).floor().max(1.0);
+        // Equal steps differ by rounding.
+        let count = ((ends[1] - ends[0]) / width_rad + 1e-6).floor().max(1.0);
         let span = (ends[1] - ends[0]).max(f64::MIN_POSITIVE);
         block.extend(scan.iter().map(|point| {
             let share = (points.angle_rad(point) - ends[0]) / span;
@@ -139,6 +140,22 @@ mod tests {
         let folds = Folds::new(&points, &white, 5, 0);
         assert!((folds.width_rad.to_degrees() - 3.0).abs() < 1e-6, "{folds:?}");
         assert!(folds.blocks < points.points.len() / 6, "{folds:?}");
+    }
+
+    #[test]
+    fn twenty_five_equal_steps_are_eight_runs() {
+        let all = curve_of(&noisy(&[30.0], 1.0, 0.0, |_| 0.0), None);
+        for first_deg in [-60.0, -30.0, 0.0, 5.0, 10.0] {
+            for step_deg in [0.5, 1.0, 2.0, 2.5] {
+                let mut points = Points { points: all.points[..25].to_vec(), ..all.clone() };
+                for (k, point) in points.points.iter_mut().enumerate() {
+                    point.theta_s_rad = (first_deg + step_deg * k as f64).to_radians();
+                }
+                let white: Vec<f64> = (0..25).map(|k| [1.0, -1.0][k % 2]).collect();
+                let folds = Folds::new(&points, &white, 5, 0);
+                assert_eq!(folds.blocks, 8, "{first_deg} {step_deg}");
+            }
+        }
     }
 
     #[test]

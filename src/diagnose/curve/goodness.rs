@@ -2,10 +2,9 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
-use super::model::{Fit, Model};
 use super::points::Points;
 use super::report::CurveUnknown;
-use super::select::Selection;
+use super::select::{Selection, State};
 
 /// Name of structure of unknown origin.
 const UNKNOWN: &str = "unknown";
@@ -19,9 +18,9 @@ pub(super) fn least_size_db(selection: &Selection) -> f64 {
     settings.least_size_db.min(LEAST_OF_NOISE * noise_db)
 }
 
-/// Probability by chance of a residual as large as that of the levels that are used; none where the noise is unknown.
-pub(super) fn goodness(points: &Points, model: &Model, fit: &Fit, used: &[bool]) -> Option<f64> {
-    let (square_db2, spare) = scatter_db2(points, model, fit, used);
+/// Probability by chance of a residual as large as that of a model; none where the noise is unknown.
+pub(super) fn goodness(points: &Points, state: &State) -> Option<f64> {
+    let (square_db2, spare) = scatter_db2(points, state);
     let ratio = square_db2 / points.noise.sd_db.powi(2);
     let freedom = points.noise.freedom;
     if !points.has_known_noise() {
@@ -35,31 +34,20 @@ pub(super) fn goodness(points: &Points, model: &Model, fit: &Fit, used: &[bool])
     Some(chance.unwrap_or(1.0))
 }
 
-/// Mean square residual of the detections that are used, per degree of freedom, dB², and that number.
-fn scatter_db2(points: &Points, model: &Model, fit: &Fit, used: &[bool]) -> (f64, f64) {
-    let residual_db = points.residuals_db(&model.levels_db(&fit.at, &points.points));
-    let mut squares = Vec::new();
-    for ((point, residual), _) in
-        points.points.iter().zip(&residual_db).zip(used).filter(|(_, used)| **used)
-    {
-        if !point.censored {
-            squares.push(residual * residual);
-        }
-    }
+/// Mean square residual of the detections, per degree of freedom, dB², and that number.
+fn scatter_db2(points: &Points, State { model, fitted, .. }: &State) -> (f64, f64) {
+    let residual_db = points.residuals_db(&model.levels_db(&fitted.at, &points.points));
+    let seen = points.points.iter().zip(&residual_db).filter(|(point, _)| !point.censored);
+    let squares: Vec<f64> = seen.map(|(_, residual_db)| residual_db.powi(2)).collect();
     let spare = squares.len().saturating_sub(model.unknowns()).max(1) as f64;
     (squares.iter().sum::<f64>() / spare, spare)
 }
 
 /// More scatter than the noise has.
-pub(super) fn scattered(
-    selection: &Selection,
-    model: &Model,
-    fit: &Fit,
-    used: &[bool],
-) -> Option<CurveUnknown> {
+pub(super) fn scattered(selection: &Selection, state: &State) -> Option<CurveUnknown> {
     let Selection { points, settings, .. } = *selection;
-    let p_value = goodness(points, model, fit, used)?;
-    let (square_db2, _) = scatter_db2(points, model, fit, used);
+    let p_value = goodness(points, state)?;
+    let (square_db2, _) = scatter_db2(points, state);
     let strength_db = (square_db2 - points.noise.sd_db.powi(2)).max(0.0).sqrt();
     let is_found = p_value <= settings.family_error && strength_db >= least_size_db(selection);
     is_found.then(|| unknown("scatter", strength_db, p_value))

@@ -1,12 +1,15 @@
 //! Levels that lie far off by themselves, where a model explains all others.
 
 use super::goodness::unknown;
+use super::model::Fit;
 use super::points::{Point, Points};
 use super::remains;
 use super::report::CurveUnknown;
 use super::select::{Selection, State};
 use crate::fit::normal_share;
 
+/// What isolated levels are called in a report.
+const ISOLATED: &str = "isolated angles";
 /// Scatters by which an isolated level is off.
 const FAR_OFF: f64 = 5.0;
 /// Largest share of the levels that are isolated, and of a scan's levels in one peak, in which three may always be.
@@ -18,8 +21,9 @@ const REFITS: usize = 8;
 /// Median of the absolute value of a standard normal number.
 const MEDIAN: f64 = 0.6745;
 
-/// Levels that lie far off by themselves, where no test of what the model leaves of all others finds anything.
-pub(super) fn isolated(selection: &Selection, state: &State) -> Option<CurveUnknown> {
+/// Levels that lie far off by themselves, where no test of what the model leaves of all others finds anything, and the fit
+/// to these.
+pub(super) fn isolated(selection: &Selection, state: &State) -> Option<(CurveUnknown, Fit)> {
     let Selection { points, .. } = *selection;
     let State { model, fitted, .. } = state;
     let all = &points.points;
@@ -46,7 +50,8 @@ pub(super) fn isolated(selection: &Selection, state: &State) -> Option<CurveUnkn
     let residual_db = points.residuals_db(&model.levels_db(&fit.at, all));
     let (others, folds) = (points.only(&used), selection.folds.only(&used));
     let of_others = Selection { points: &others, folds: &folds, ..*selection };
-    if !remains::unexplained(&of_others, &of_others.state(model.clone(), fit)).is_empty() {
+    let of_others_alone = of_others.state(model.clone(), fit.clone());
+    if !remains::unexplained(&of_others, &of_others_alone).is_empty() {
         return None;
     }
     let square_db2: f64 = off.iter().map(|&index| residual_db[index].powi(2)).sum();
@@ -55,10 +60,9 @@ pub(super) fn isolated(selection: &Selection, state: &State) -> Option<CurveUnkn
         .map(|&index| [all[index].theta_i_rad, all[index].theta_s_rad].map(f64::to_degrees));
     let strength_db = (square_db2 / off.len() as f64).sqrt();
     let p_value = 2.0 * all.len() as f64 * normal_share(-FAR_OFF);
-    Some(CurveUnknown {
-        at_deg: at_deg.collect(),
-        ..unknown("isolated angles", strength_db, p_value)
-    })
+    let found =
+        CurveUnknown { at_deg: at_deg.collect(), ..unknown(ISOLATED, strength_db, p_value) };
+    Some((found, fit))
 }
 
 /// Scatter of the levels that are used by the median of their sizes, at least the noise where that is known, dB.

@@ -13,7 +13,7 @@
 //! | scattering model and terms together | `model.rs` |
 //! | other scattering models | `laws.rs` |
 //! | held-out runs of angles, choice of terms | `folds.rs`, `select.rs`, `trust.rs` |
-//! | what remains | `goodness.rs`, `smooth.rs`, `remains.rs` |
+//! | what remains | `goodness.rs`, `smooth.rs`, `remains.rs`, `isolated.rs` |
 //! | the answer and its report | `answer.rs`, `evidence.rs`, `report.rs`, `run.rs` |
 
 mod answer;

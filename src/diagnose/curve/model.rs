@@ -2,10 +2,11 @@
 //!
 //! A level y is normal about the model's with a scale s, times its own spread; a censored one states that y lies below. s is
 //! the rms residual of the fit, and at least the noise: a wrong model must not appear certain.
-//! Held-out levels are scored by Student's distribution with four degrees of freedom and the same variance:
+//! Held-out levels and limits are scored by Student's distribution with four degrees of freedom and the same variance:
 //! the residual of a wrong model has tails, and a few angles must not decide alone.
 
 use nalgebra::{DMatrix, DVector};
+use statrs::function::beta::beta_reg;
 
 use super::points::Kind;
 use super::points::{Point, Points};
@@ -69,12 +70,12 @@ pub(super) struct Score {
 impl Score {
     /// The score of a level at a held-out point; level and scale in dB.
     pub fn new(point: &Point, f_db: f64, scale_db: f64) -> Score {
-        if point.censored {
-            return Score { f_db, log_p: log_p(point, f_db, scale_db) };
-        }
         // With four degrees of freedom the variance is twice the squared scale, and the peak density 3/8.
         let width_db = scale_db * point.spread * std::f64::consts::FRAC_1_SQRT_2;
         let z = (point.f_db - f_db) / width_db;
+        if point.censored {
+            return Score { f_db, log_p: student_below(z).max(f64::MIN_POSITIVE).ln() };
+        }
         let log_p = 0.375f64.ln() - width_db.ln() - 2.5 * (0.25 * z * z).ln_1p();
         Score { f_db, log_p }
     }
@@ -133,6 +134,17 @@ impl Model {
         (law, values.collect())
     }
 
+    /// A point at which the term of this number changes nothing.
+    pub fn without(&self, at: &DVector<f64>, term: usize) -> DVector<f64> {
+        let mut without = at.clone();
+        let before = self.terms.iter().take(term).map(|term| term.parameters().len());
+        let first = self.coordinates.len() + before.sum::<usize>();
+        for (place, known) in self.terms[term].parameters().iter().enumerate() {
+            without[first + place] = known.absent / known.step;
+        }
+        without
+    }
+
     /// 10·lg f at every point.
     pub fn levels_db(&self, at: &DVector<f64>, points: &[Point]) -> Vec<f64> {
         let (law, values) = self.numbers(at);
@@ -181,7 +193,7 @@ impl Model {
         let curvature = self.local(&found.at, &bounds[1], &chosen, scale_db).curvature;
         let ranges = &bounds[1] - &bounds[0];
         let determined = determined(&curvature, ranges.as_slice()) as f64;
-        let penalty = 0.5 * determined * (chosen.len() as f64).ln();
+        let penalty = 0.5 * determined * (chosen.len().max(1) as f64).ln();
         Fit { scale_db, log_p, converged: found.converged(), curvature, penalty, at: found.at }
     }
 
@@ -302,8 +314,31 @@ fn log_below(z: f64) -> f64 {
     normal_share(z).max(f64::MIN_POSITIVE).ln()
 }
 
+/// Probability of a number below z by Student's distribution with four degrees of freedom.
+fn student_below(z: f64) -> f64 {
+    let share = 4.0 / (4.0 + z * z);
+    let tail = 0.5 * beta_reg(2.0, 0.5, share);
+    if z < 0.0 { tail } else { 1.0 - tail }
+}
+
 /// φ(z)/Φ(z).
 fn mills(z: f64) -> f64 {
     let log_density = -0.5 * z * z - 0.5 * std::f64::consts::TAU.ln();
     (log_density - log_below(z)).exp()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_have_the_tails_of_student() {
+        // Tables: the 97.5 and the 99.95 % quantile of four degrees of freedom.
+        for (z, share) in [(0.0, 0.5), (2.776_445, 0.975), (8.610_302, 0.9995)] {
+            assert!((student_below(z) - share).abs() < 1e-6, "{z}");
+            assert!((student_below(-z) - (1.0 - share)).abs() < 1e-6, "{z}");
+        }
+        // The density 12/|z|⁵ far out, over the tail: 3/z⁴.
+        assert!((student_below(-1e4) / 3e-16 - 1.0).abs() < 1e-6);
+    }
 }

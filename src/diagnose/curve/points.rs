@@ -99,8 +99,10 @@ pub(super) struct Contradiction {
     pub scatter_db: f64,
 }
 
-/// Angle of incidence from which on σ⁰ does not give f, rad.
+/// Angle from which on σ⁰ does not give f, rad.
 const GRAZING_RAD: f64 = 1.569;
+/// Points that two repeats must share to be compared.
+const LEAST_SHARED: usize = 8;
 /// Least noise of a file, dB: files round.
 const LEAST_NOISE_DB: f64 = 0.01;
 /// Quantile of the deviations that gives the noise: twice as precise as the median, and insensitive to a few bends.
@@ -114,7 +116,7 @@ type Group = Vec<(Point, Option<f64>)>;
 impl Points {
     /// The points of a curve: of backscatter, where all its rows are, else in the plane of incidence. Repeats of an angle
     /// become points of their mean level, in backscatter where half of the rows are repeats. `sd_db` is what the file
-    /// states of the deviation of each level, for none or for all rows.
+    /// states of the deviation of each level, for none or for all rows. Rows at grazing angles are left out.
     ///
     /// # Errors
     /// The number of a row, from 1, that is out of the plane of incidence.
@@ -126,22 +128,21 @@ impl Points {
         let rows = curve.observations.iter().enumerate();
         let rows = rows.map(|(index, row)| (row, sd_db.get(index).copied().flatten()));
         if curve.observations.iter().all(Observation::is_retro) {
-            return Ok(Points::backscatter(rows, noise_db));
+            return Ok(Points::backscatter(rows.filter(|(row, _)| !is_grazing(row)), noise_db));
         }
-        let points = rows.enumerate().filter_map(|(index, (row, sd_db))| {
+        let rows = rows.enumerate().filter(|(_, (row, _))| !is_grazing(row));
+        let points = rows.filter_map(|(index, (row, sd_db))| {
             let level = row.level_sigma0()?;
             Some(point_in_plane(row, level).map(|point| (point, sd_db)).ok_or(index + 1))
         });
         Ok(Points::in_plane(points.collect::<Result<Group, usize>>()?, noise_db))
     }
 
-    /// Rows at grazing incidence, where σ⁰ does not determine f, are left out.
     fn backscatter<'a>(
         rows: impl Iterator<Item = (&'a Observation, Option<f64>)>,
         noise_db: Option<f64>,
     ) -> Points {
         let mut points: Group = rows
-            .filter(|(row, _)| !is_grazing(row))
             .filter_map(|(row, sd_db)| {
                 let theta_rad = row.theta_i_rad;
                 let i = Direction::from_angles(theta_rad, PI);
@@ -219,6 +220,13 @@ impl Points {
         chosen
     }
 
+    /// Number of the repeats that hold so many points or more.
+    pub(super) fn most_repeats(&self, least: usize) -> usize {
+        let mut counts: Vec<usize> = self.repeats.iter().map(Vec::len).collect();
+        counts.sort_unstable_by(|a, b| b.cmp(a));
+        counts.get(least.saturating_sub(1)).copied().unwrap_or(0)
+    }
+
     /// One of the repeats, from 0, by itself. One level scatters more than the mean of several.
     pub(super) fn repeat(&self, number: usize) -> Points {
         let pairs = self.points.iter().zip(&self.repeats);
@@ -231,7 +239,7 @@ impl Points {
 
     /// Two repeats whose difference a line over the angles follows far from zero, if there are any.
     pub(super) fn contradiction(&self) -> Option<Contradiction> {
-        let most = self.repeats.iter().map(Vec::len).max().unwrap_or(0);
+        let most = self.most_repeats(LEAST_SHARED);
         let pairs = (0..most).flat_map(|a| (a + 1..most).map(move |b| [a, b]));
         let contradictions = pairs.filter_map(|[a, b]| {
             let both = self.points.iter().zip(&self.repeats);
@@ -267,9 +275,9 @@ impl Points {
     }
 }
 
-/// Whether a row of backscatter is left out, since σ⁰ does not give f there.
+/// Whether a row is left out, since σ⁰ does not give f where one of its angles is so large.
 pub fn is_grazing(row: &Observation) -> bool {
-    row.is_retro() && row.theta_i_rad >= GRAZING_RAD
+    row.theta_i_rad.max(row.theta_r_rad) >= GRAZING_RAD
 }
 
 /// An angle as a key that rounding does not change.
@@ -372,8 +380,6 @@ fn stated(groups: &[Group]) -> Option<Vec<f64>> {
 /// How far a line through differences of two repeats over the angle is from zero at its farther end, dB, and the scatter
 /// about it; `None` where chance may make it, or noise.
 fn far_apart_db(differences: &[(f64, f64)]) -> Option<(f64, f64)> {
-    /// Points that two repeats must share to be compared.
-    const LEAST_SHARED: usize = 8;
     /// Standard errors of the difference, and its size, dB, from which on it is no chance.
     const ERRORS: f64 = 5.0;
     const LEAST_DB: f64 = 1.0;

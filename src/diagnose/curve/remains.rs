@@ -56,8 +56,7 @@ pub(super) fn unexplained(selection: &Selection, state: &State) -> Vec<CurveUnkn
         covariates.filter_map(|covariate| over(selection, state, covariate)).collect();
     found.sort_by(|a, b| b.held_out_gain.unwrap_or(0.0).total_cmp(&a.held_out_gain.unwrap_or(0.0)));
     found.extend(correlated(selection, state));
-    let all = vec![true; selection.points.points.len()];
-    found.extend(scattered(selection, &state.model, &state.fitted, &all));
+    found.extend(scattered(selection, state));
     found
 }
 

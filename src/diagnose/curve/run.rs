@@ -91,7 +91,7 @@ impl CurveDiagnosis {
 
     fn report(&self, selection: &Selection, compared: &[Compared], answer: Answer) -> CurveReport {
         let Selection { points, folds, .. } = *selection;
-        let Answer { law, after, ranking, added, may_be, unexplained } = answer;
+        let Answer { law, after, ranking, added, may_be, unexplained, .. } = answer;
         let (effects, parameters) = remains::values(selection, &after, added);
         let verdict = if !unexplained.is_empty() {
             CurveVerdict::Unexplained

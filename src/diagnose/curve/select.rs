@@ -43,6 +43,13 @@ pub(super) struct Addition {
     pub evidence: CurveEvidence,
 }
 
+impl Addition {
+    /// Names of the term and of those that do as well.
+    pub fn names(&self) -> impl Iterator<Item = &'static str> {
+        [self.term.name()].into_iter().chain(self.class.iter().copied())
+    }
+}
+
 /// Chooses the terms of a curve.
 #[derive(Clone, Copy)]
 pub(super) struct Selection<'a> {

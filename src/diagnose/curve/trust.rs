@@ -18,9 +18,11 @@ const SHARE_IN_EACH: f64 = 0.25;
 /// A number nearer to a bound than this share of its range is at the bound.
 const AT_BOUND: f64 = 1e-3;
 
-/// Whether no number of a term is at a bound, a film shows a whole fringe, and the terms together hold in every repeat.
+/// Whether no number of a term is at a bound, a film shows a whole fringe, every term changes the levels by so much, dB, and
+/// the terms together hold in every repeat.
 pub(super) fn are_trusted(
     points: &Points,
+    least_db: f64,
     before: &State,
     after: &State,
     added: &[Addition],
@@ -30,7 +32,8 @@ pub(super) fn are_trusted(
         is_inside(one.term, values)
             && (one.term.name() != ThinFilm.name()
                 || fringes(points, &law, values) >= LEAST_FRINGES)
-    }) && holds_in_repeats(points, before, after)
+    }) && all_matter(points, after, least_db)
+        && holds_in_repeats(points, before, after)
 }
 
 /// Whether no number of a term is at a bound.
@@ -55,16 +58,26 @@ fn fringes(points: &Points, law: &Brdf, values: &[f64]) -> f64 {
     (most - least) / TAU
 }
 
-/// Whether the terms gain in every repeat of the curve, fitted to it alone.
+/// Whether every term still changes the levels by so much, dB, beside those that came after it.
+fn all_matter(points: &Points, State { model, fitted, .. }: &State, least_db: f64) -> bool {
+    let with = model.levels_db(&fitted.at, &points.points);
+    (0..model.terms.len()).all(|term| {
+        let without = model.levels_db(&model.without(&fitted.at, term), &points.points);
+        let squares: f64 = with.iter().zip(&without).map(|(a, b)| (a - b).powi(2)).sum();
+        squares >= least_db.powi(2) * with.len() as f64
+    })
+}
+
+/// Whether the terms gain in every repeat of the curve that has enough levels, fitted to it alone.
 fn holds_in_repeats(points: &Points, before: &State, after: &State) -> bool {
-    let most = points.repeats.iter().map(Vec::len).max().unwrap_or(0);
+    let most = points.most_repeats(LEAST_LEVELS);
     let share = (after.fitted.log_p - before.fitted.log_p) / most.max(1) as f64;
     (0..most).all(|number| {
         let repeat = points.repeat(number);
         let all = vec![true; repeat.points.len()];
         let [without, with] =
             [before, after].map(|state| state.model.fit(&repeat, &all, &state.fitted.at).log_p);
-        repeat.points.len() < LEAST_LEVELS || with - without >= SHARE_IN_EACH * share
+        with - without >= SHARE_IN_EACH * share
     })
 }
 

@@ -3,9 +3,7 @@
 use std::path::Path;
 
 use crate::brdf::Brdf;
-use crate::diagnose::curve::{
-    CurveDiagnosis, CurveReport, Kind, Points, Term, base_law, is_grazing,
-};
+use crate::diagnose::curve::{CurveDiagnosis, CurveReport, Points, Term, base_law, is_grazing};
 use crate::error::Error;
 use crate::formats::{ColumnNames, FormatError};
 use crate::material::file::in_plane::{is_bsdf, read_bsdf};
@@ -76,7 +74,7 @@ impl CurveRequest<'_> {
             FormatError::at(place, "it is out of the plane of incidence", "leave such points out")
         })?;
         let grazing = curve.observations.iter().filter(|row| is_grazing(row)).count();
-        if grazing > 0 && points.kind == Kind::Backscatter {
+        if grazing > 0 {
             notices.push(format!("levels at 89.9° or more are not used: {grazing}"));
         }
         Ok((points, notices))

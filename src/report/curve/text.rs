@@ -44,6 +44,9 @@ pub(super) fn sentence(report: &CurveReport) -> String {
             report.base.law
         ),
         CurveVerdict::Explained => format!("the law lacks {names}; with that, only noise is left"),
+        CurveVerdict::Unexplained if report.unexplained.iter().any(|one| !one.at_deg.is_empty()) => {
+            "a law explains all levels but isolated ones: what these are is unknown".to_owned()
+        }
         CurveVerdict::Unexplained if report.laws.len() > 1 => {
             "the law does not explain the curve, and neither another law nor an effect that was tried \
              does: what remains is unknown"
