@@ -165,7 +165,7 @@ fn a_level_at_a_right_angle_is_left_out_and_said() {
         text += &format!("{theta_deg},{:.2}\n", level_db + 0.1 * f64::from(k % 3));
     }
     fs::write(at.join("curve.csv"), text).unwrap();
-    let command = ["-q", "diagnose", "--curve", "curve.csv", "--noise-db", "0.2", "-o", "out"];
+    let command = ["diagnose", "--curve", "curve.csv", "--noise-db", "0.2", "-o", "out"];
     let output = matdb(at).args(command).output().unwrap();
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.success(), "{said}");
