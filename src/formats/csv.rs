@@ -207,7 +207,7 @@ impl Table {
     pub fn required_number(&self, row: usize, column: &str) -> Result<f64, FormatError> {
         self.number(row, column)?.ok_or_else(|| {
             let place = format!("{}, column {column}", self.place(row));
-            FormatError::at(place, "the cell is empty", "fill in a number")
+            FormatError::at(place, "the cell is empty", "fill in a number, or leave the line out")
         })
     }
 
@@ -388,11 +388,11 @@ fn rows_of_words(bytes: &[u8]) -> Result<Vec<Row>, FormatError> {
 
 fn malformed(error: csv::Error) -> FormatError {
     let line = error.position().map_or(1, csv::Position::line);
-    let problem = match error.kind() {
-        csv::ErrorKind::Utf8 { .. } => "the text is not UTF-8",
-        _ => "the text is not CSV",
+    let (problem, way_out) = match error.kind() {
+        csv::ErrorKind::Utf8 { .. } => ("the text is not UTF-8", "save the file as UTF-8"),
+        _ => ("the text is not CSV", "mend the line"),
     };
-    FormatError::at(format!("line {line}"), problem, "mend the line")
+    FormatError::at(format!("line {line}"), problem, way_out)
 }
 
 /// The bytes with the comment lines at the head emptied, so that the other lines keep their numbers.

@@ -55,7 +55,6 @@ fn publish(
         model: args.model.as_deref(),
         seed: args.seed,
         not_tried: &terms_not_asked(effects),
-        two_lobes: "--model mixture",
     };
     let files = answer.files()?;
     let earlier = Earlier::in_folder(&args.output, &[path]);

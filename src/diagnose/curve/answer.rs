@@ -8,7 +8,7 @@ use super::remains;
 use super::report::{ComparedLaw, CurveUnknown};
 use super::select::{Addition, FAR_BETTER, Selection, State};
 use super::terms::Term;
-use super::trust::are_trusted;
+use super::trust::{NameDoubt, doubts};
 
 /// Name of the model that was asked for.
 pub(super) const DECLARED: &str = "declared";
@@ -67,6 +67,7 @@ pub(super) struct Answer {
     pub ranking: Vec<RankedTerm>,
     pub added: Vec<Addition>,
     pub may_be: Vec<&'static str>,
+    pub doubts: Vec<NameDoubt>,
     pub unexplained: Vec<CurveUnknown>,
     /// Schwarz's criterion where no more than noise remains with the terms, be they trusted or not; else infinite.
     explains_at: f64,
@@ -111,17 +112,26 @@ impl Answer {
         }
         // What improves a model and leaves more than noise may stand for something else, and an effect beside another law
         // for a law that is wrong as well.
-        let mut ranking = Vec::new();
-        let mut may_be = Vec::new();
+        let mut answer = Answer::without_terms(declared, declared.left.clone());
         for one in found {
-            may_be.extend(one.added.iter().flat_map(Addition::names));
-            may_be.extend(one.may_be);
-            ranking.extend(one.ranking);
+            if !one.added.is_empty() {
+                answer.doubts.push(match one.law {
+                    _ if !one.unexplained.is_empty() => NameDoubt::MoreRemains,
+                    DECLARED => NameDoubt::OtherBetter,
+                    _ => NameDoubt::BesideLaw,
+                });
+            }
+            answer.may_be.extend(one.added.iter().flat_map(Addition::names));
+            answer.may_be.extend(one.may_be);
+            answer.doubts.extend(one.doubts);
+            answer.ranking.extend(one.ranking);
         }
-        may_be.sort_unstable();
-        may_be.dedup();
-        let without = Answer::without_terms(declared, declared.left.clone());
-        Answer { ranking, may_be, ..without }
+        answer.may_be.sort_unstable();
+        answer.may_be.dedup();
+        answer.doubts.sort_unstable();
+        answer.doubts.dedup();
+        answer.ranking.iter_mut().for_each(|one| one.accepted = false);
+        answer
     }
 
     fn without_terms(one: &Compared, unexplained: Vec<CurveUnknown>) -> Answer {
@@ -131,6 +141,7 @@ impl Answer {
             ranking: Vec::new(),
             added: Vec::new(),
             may_be: Vec::new(),
+            doubts: Vec::new(),
             unexplained,
             explains_at: f64::INFINITY,
         }
@@ -144,17 +155,21 @@ impl Answer {
         let explains_at =
             if unexplained.is_empty() { after.fitted.criterion() } else { f64::INFINITY };
         let least_db = selection.settings.least_named_db;
-        let shapes = added.iter().filter(|one| one.term.is_shape()).count();
-        let is_trusted = selection.points.has_known_noise()
-            && added.iter().all(|one| one.evidence.size_db >= least_db)
-            && (shapes == 0 || shapes == added.len())
-            && are_trusted(selection.points, least_db, &one.state, &after, &added);
-        if !is_trusted {
+        let doubts = doubts(selection.points, least_db, &one.state, &after, &added);
+        if !doubts.is_empty() {
             let may_be = added.iter().flat_map(Addition::names).collect();
             let answer = Answer::without_terms(one, one.left.clone());
-            return Answer { ranking, may_be, explains_at, ..answer };
+            return Answer { ranking, may_be, doubts, explains_at, ..answer };
         }
-        let may_be = Vec::new();
-        Answer { law: one.name, after, ranking, added, may_be, unexplained, explains_at }
+        Answer {
+            law: one.name,
+            after,
+            ranking,
+            added,
+            may_be: Vec::new(),
+            doubts,
+            unexplained,
+            explains_at,
+        }
     }
 }

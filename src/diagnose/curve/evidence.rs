@@ -21,7 +21,7 @@ pub struct RankedTerm {
     pub size_db: f64,
     /// Whether its fit converged.
     pub converged: bool,
-    /// Whether it was added.
+    /// Whether it was added, and has a name.
     pub accepted: bool,
 }
 

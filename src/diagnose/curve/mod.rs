@@ -48,3 +48,4 @@ pub use report::{
 };
 pub use settings::CurveDiagnosis;
 pub use terms::{Term, term, terms};
+pub use trust::NameDoubt;

@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::evidence::{CurveEvidence, RankedTerm};
 use super::model::Score;
 use super::points::{Kind, NoiseSource, Points};
+use super::trust::NameDoubt;
 use crate::diagnose::report::Value;
 use crate::effects::Level;
 
@@ -200,6 +201,8 @@ pub struct CurveReport {
     pub ranking: Vec<RankedTerm>,
     /// Terms that improve the law and get no name: more than noise remains, the noise is unknown, or they cannot be trusted.
     pub may_be: Vec<&'static str>,
+    /// Why these get no name.
+    pub doubts: Vec<NameDoubt>,
     /// The scattering models that the curve was compared with: the others only where the first does not explain it.
     pub laws: Vec<ComparedLaw>,
     /// Structure that no term explains.

@@ -91,7 +91,7 @@ impl CurveDiagnosis {
 
     fn report(&self, selection: &Selection, compared: &[Compared], answer: Answer) -> CurveReport {
         let Selection { points, folds, .. } = *selection;
-        let Answer { law, after, ranking, added, may_be, unexplained, .. } = answer;
+        let Answer { law, after, ranking, added, may_be, doubts, unexplained, .. } = answer;
         let (effects, parameters) = remains::values(selection, &after, added);
         let verdict = if !unexplained.is_empty() {
             CurveVerdict::Unexplained
@@ -112,6 +112,7 @@ impl CurveDiagnosis {
             effects,
             ranking,
             may_be,
+            doubts,
             laws: compared.iter().map(|one| one.in_report(points)).collect(),
             unexplained,
             error: before_after(points, folds, [&before.held_out, &after.held_out]),

@@ -221,8 +221,10 @@ fn an_effect_that_changes_little_has_no_name() {
     let (little, more) = (report(LITTLE), report(3.0 * LITTLE));
     assert_eq!(little.verdict, CurveVerdict::Unexplained, "{little:#?}");
     assert!(little.effects.is_empty() && little.may_be.contains(&"stray-light"), "{little:#?}");
-    let size_db = little.ranking.iter().find(|one| one.accepted).unwrap().size_db;
-    assert!((0.1..0.3).contains(&size_db), "{size_db}");
+    assert!(little.doubts.contains(&NameDoubt::Small), "{:?}", little.doubts);
+    assert!(little.ranking.iter().all(|one| !one.accepted), "{:?}", little.ranking);
+    let light = little.ranking.iter().find(|one| one.name == "stray-light").unwrap();
+    assert!((0.1..0.3).contains(&light.size_db), "{light:?}");
     assert_eq!(more.effects[0].name, "stray-light", "{more:#?}");
 }
 const LITTLE: f64 = 0.001;
@@ -298,6 +300,7 @@ fn an_effect_must_hold_in_every_repeat() {
     let one = repeated(false);
     assert_eq!(one.verdict, CurveVerdict::Unexplained, "{one:#?}");
     assert!(one.effects.is_empty() && one.may_be.contains(&"thin-film"), "{:?}", one.may_be);
+    assert!(one.doubts.contains(&NameDoubt::NotInRepeats), "{:?}", one.doubts);
 }
 
 /// A backscatter curve without a threshold.

@@ -1,4 +1,6 @@
-//! Whether terms that improve a model may be called by their names.
+//! Whether terms that improve a model may be called by their names, and why not.
+
+use serde::Serialize;
 
 use std::f64::consts::TAU;
 
@@ -18,22 +20,56 @@ const SHARE_IN_EACH: f64 = 0.25;
 /// A number nearer to a bound than this share of its range is at the bound.
 const AT_BOUND: f64 = 1e-3;
 
-/// Whether no number of a term is at a bound, a film shows a whole fringe, every term changes the levels by so much, dB, and
-/// the terms together hold in every repeat.
-pub(super) fn are_trusted(
+/// Why what improves a model gets no name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum NameDoubt {
+    /// The noise of a level is not known.
+    NoiseUnknown,
+    /// It changes the levels by less than laws and instruments err.
+    Small,
+    /// A number is at its bound.
+    AtBound,
+    /// A film shows less than a whole fringe.
+    NoFringe,
+    /// A repeat does not have it.
+    NotInRepeats,
+    /// It stands beside a term that makes another law.
+    BesideShape,
+    /// It stands beside another law than the declared one.
+    BesideLaw,
+    /// Another law with effects does better.
+    OtherBetter,
+    /// More than the noise remains with it.
+    MoreRemains,
+}
+
+/// The doubts of terms that were added: a number at a bound, a film without a whole fringe, a term that changes the levels
+/// by less than `least_db`, dB, a term beside one of a shape, a repeat without them.
+pub(super) fn doubts(
     points: &Points,
     least_db: f64,
     before: &State,
     after: &State,
     added: &[Addition],
-) -> bool {
+) -> Vec<NameDoubt> {
     let (law, values) = after.model.numbers(&after.fitted.at);
-    added.iter().zip(&values).all(|(one, values)| {
-        is_inside(one.term, values)
-            && (one.term.name() != ThinFilm.name()
-                || fringes(points, &law, values) >= LEAST_FRINGES)
-    }) && all_matter(points, after, least_db)
-        && holds_in_repeats(points, before, after)
+    let pairs = || added.iter().zip(&values);
+    let film = pairs().find(|(one, _)| one.term.name() == ThinFilm.name());
+    let shapes = added.iter().filter(|one| one.term.is_shape()).count();
+    let is_small = added.iter().any(|one| one.evidence.size_db < least_db);
+    let all = [
+        (NameDoubt::NoiseUnknown, !points.has_known_noise()),
+        (NameDoubt::Small, is_small || !all_matter(points, after, least_db)),
+        (NameDoubt::AtBound, pairs().any(|(one, values)| !is_inside(one.term, values))),
+        (
+            NameDoubt::NoFringe,
+            film.is_some_and(|(_, values)| fringes(points, &law, values) < LEAST_FRINGES),
+        ),
+        (NameDoubt::NotInRepeats, !holds_in_repeats(points, before, after)),
+        (NameDoubt::BesideShape, shapes > 0 && shapes < added.len()),
+    ];
+    all.into_iter().filter_map(|(doubt, holds)| holds.then_some(doubt)).collect()
 }
 
 /// Whether no number of a term is at a bound.

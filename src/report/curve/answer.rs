@@ -16,6 +16,4 @@ pub struct CurveAnswer<'a> {
     pub seed: u64,
     /// Effects that were left out.
     pub not_tried: &'a [UntriedEffect],
-    /// How the reader asks for a law with two lobes.
-    pub two_lobes: &'a str,
 }

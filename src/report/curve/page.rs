@@ -32,7 +32,7 @@ struct Page<'a> {
     not_tried: Vec<Omission>,
     /// Numbers of the base law: name and value.
     law: Vec<[String; 2]>,
-    advice: Option<String>,
+    advice: Vec<String>,
     may_be: Option<String>,
 }
 
@@ -72,7 +72,7 @@ pub(super) fn page(answer: CurveAnswer, picture: &Picture) -> Result<Vec<u8>, Er
         not_tried: left_out(not_tried),
         law,
         may_be: may_be(report).map(|one| capitalised(&one) + "."),
-        advice: advice(answer).map(|advice| capitalised(&advice) + "."),
+        advice: advice(report).iter().map(|one| capitalised(one) + ".").collect(),
     };
     templates::page("curve.html", &context)
 }

@@ -3,10 +3,15 @@
 use std::path::Path;
 
 use super::answer::CurveAnswer;
-use crate::diagnose::curve::{CurveReport, CurveUnknown, CurveVerdict, FoundTerm, NoiseSource};
+use crate::diagnose::curve::{
+    CurveReport, CurveUnknown, CurveVerdict, FoundTerm, Kind, NameDoubt, NoiseSource,
+};
 use crate::effects::Level;
 use crate::formats::words::{listed, plus_minus};
 use crate::report::words::{gone, others, value};
+
+/// Residual of the nearest law, dB, from which on levels or angles may mean something else.
+const FAR_OFF_DB: f64 = 2.0;
 
 /// The verdict in a word or two.
 pub(super) fn verdict(verdict: CurveVerdict) -> &'static str {
@@ -78,12 +83,28 @@ fn or_alike(found: &FoundTerm) -> String {
 pub(super) fn may_be(report: &CurveReport) -> Option<String> {
     (!report.may_be.is_empty()).then(|| {
         format!(
-            "may be {}: a law improves with that, but not to its noise, by less than 0.3 dB, not in every \
-             repeat, with a number at its bound, or only beside another law or lobe; a law of another shape would \
-             do the same",
-            listed(&report.may_be)
+            "may be {}, but has no name: {}",
+            listed(&report.may_be),
+            listed(&report.doubts.iter().map(|one| doubt(*one)).collect::<Vec<&str>>())
         )
     })
+}
+
+/// Why an effect gets no name.
+fn doubt(doubt: NameDoubt) -> &'static str {
+    match doubt {
+        NameDoubt::NoiseUnknown => "the noise of a level is not known",
+        NameDoubt::Small => {
+            "it changes the levels by less than 0.3 dB, as laws and instruments err"
+        }
+        NameDoubt::AtBound => "one of its numbers is at the end of its range",
+        NameDoubt::NoFringe => "a film would show less than a whole fringe",
+        NameDoubt::NotInRepeats => "one of the repeats lacks it",
+        NameDoubt::BesideShape => "it stands beside a term that makes another law",
+        NameDoubt::BesideLaw => "with it another law than the declared one explains the curve",
+        NameDoubt::OtherBetter => "another law with an effect does better",
+        NameDoubt::MoreRemains => "more than the noise remains with it",
+    }
 }
 
 /// How the noise is known.
@@ -108,21 +129,39 @@ pub(super) fn angle(covariate: &str) -> &str {
     }
 }
 
-/// What to do before an instrument is blamed; `None` where none is.
-pub(super) fn advice(answer: CurveAnswer) -> Option<String> {
-    let mut blamed = Vec::new();
-    for found in &answer.report.effects {
-        if found.level == Level::Instrument {
-            blamed.push(found.name);
+/// What to do next, beyond what the verdict says.
+pub(super) fn advice(report: &CurveReport) -> Vec<String> {
+    let mut advice = Vec::new();
+    for found in &report.effects {
+        advice.push(match (found.name, found.level) {
+            ("thin-film", _) => "the thickness holds for a film of index 1.5: of index n it is about n²/2.25 \
+                                 times that, and the standard deviation does not include this"
+                .to_owned(),
+            ("subsurface", _) if report.curve.kind == Kind::Backscatter => {
+                "before the material is blamed, measure the blank: in backscatter a floor of the receiver adds \
+                 the same"
+                    .to_owned()
+            }
+            (name, Level::Instrument) => format!(
+                "before {name} is blamed, measure another sample on the same bench: what belongs to the \
+                 instrument stays"
+            ),
+            _ => continue,
+        });
+    }
+    if report.verdict == CurveVerdict::Unexplained {
+        if report.error.noise_source == NoiseSource::Neighbours {
+            advice.push("state the noise with --noise-db, or repeat some angles: without it no effect gets a name".to_owned());
+        }
+        let least_db = report.laws.iter().map(|law| law.rms_db).fold(f64::INFINITY, f64::min);
+        if least_db > FAR_OFF_DB {
+            advice.push(format!(
+                "no law comes nearer than {least_db:.1} dB: look at the unit of the levels and the signs of \
+                 the angles (θ_s is positive on the specular side)"
+            ));
         }
     }
-    let what = match answer.model {
-        Some("mixture" | "mixture-ggx") => {
-            "measure another sample on the same bench: what belongs to the instrument stays"
-        }
-        _ => &format!("try a law of the sample with two lobes: {}", answer.two_lobes),
-    };
-    (!blamed.is_empty()).then(|| format!("before {} is blamed, {what}", listed(&blamed)))
+    advice
 }
 
 /// The diagnosis on the terminal; `folder` is where its files were written.
@@ -132,11 +171,8 @@ pub(super) fn text(answer: CurveAnswer, folder: &Path) -> String {
     for found in &report.effects {
         text += &effect(found);
     }
-    if let Some(advice) = advice(answer) {
-        text += &format!("  {advice}\n");
-    }
-    if let Some(may_be) = may_be(report) {
-        text += &format!("  {may_be}\n");
+    for said in may_be(report).into_iter().chain(advice(report)) {
+        text += &format!("  {said}\n");
     }
     text += &error(report);
     if report.unexplained.is_empty() {
