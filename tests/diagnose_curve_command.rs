@@ -172,3 +172,30 @@ fn a_level_at_a_right_angle_is_left_out_and_said() {
     assert!(said.contains("levels at 89.9° or more are not used: 1"), "{said}");
     assert_eq!(json(&at.join("out/report.json"))["curve"]["points"], 45);
 }
+
+#[test]
+fn the_next_step_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let light = table("stray-light", &[0.01]);
+    // Counts, or another unit.
+    let counts = light.lines().map(|line| match line.rsplit_once(',') {
+        Some((angles, f)) if f != "brdf_per_sr" => {
+            format!("{angles},{}\n", 1000.0 * f.parse::<f64>().unwrap())
+        }
+        _ => format!("{line}\n"),
+    });
+    fs::write(at.join("counts.csv"), counts.collect::<String>()).unwrap();
+    fs::write(at.join("light.csv"), &light).unwrap();
+    for (command, sentence) in [
+        ("light.csv --noise-db 0.09", "before stray-light is blamed, measure another sample"),
+        ("light.csv", "state the noise with --noise-db, or repeat some angles"),
+        ("light.csv", "but has no name: the noise of a level is not known"),
+        ("counts.csv --noise-db 0.09", "dB: look at the unit of the levels"),
+    ] {
+        let command = format!("diagnose -o out --curve {command}");
+        let output = matdb(at).args(command.split(' ')).output().unwrap();
+        let said = String::from_utf8(output.stdout).unwrap();
+        assert!(output.status.success() && said.contains(sentence), "{command}: {said}");
+    }
+}
