@@ -190,7 +190,7 @@ impl Fit {
 }
 
 /// A start drawn around the given one; `number` from 1.
-pub(super) fn drawn_start(coordinates: &Coordinates, seed: u64, number: usize) -> DVector<f64> {
+pub(crate) fn drawn_start(coordinates: &Coordinates, seed: u64, number: usize) -> DVector<f64> {
     let key = Key { seed, chirp: number as u64, sub_ray: 1, purpose: Purpose::Fit };
     let mut draws = key.draws();
     let mut start = coordinates.start();

@@ -10,9 +10,12 @@ use super::model::{Fit, Model, Score};
 use super::points::Points;
 use super::settings::CurveDiagnosis;
 use super::terms::Term;
+use crate::fit::search::drawn_start;
 
-/// Starts of a term of which the first steps are taken.
+/// Starts of a term with the fitted law of which the first steps are taken, and as many with laws drawn around the declared one.
 const GLANCED: usize = 64;
+/// Laws that are drawn: fitted without a deep film, a law may follow its fringes, and no search comes back from there.
+const DRAWN: usize = 16;
 /// Starts of a term that are followed to their end.
 const FOLLOWED: usize = 8;
 /// Terms of a round that are judged on held-out angles.
@@ -157,13 +160,9 @@ impl Selection<'_> {
         let points = self.points;
         let all = vec![true; points.points.len()];
         let model = state.model.with(term);
-        let mut starts: Vec<(f64, DVector<f64>)> = Vec::new();
-        for values in term.starts() {
-            let at = joined(&state.fitted.at, term, &values);
-            starts.push((misfit(&model, &at, points), at));
-        }
-        starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-        starts.truncate(GLANCED);
+        let drawn = (1..=DRAWN).map(|number| self.drawn(state, number));
+        let mut starts = self.best_starts(&model, term, &[state.fitted.at.clone()], misfit);
+        starts.extend(self.best_starts(&model, term, &drawn.collect::<Vec<_>>(), scatter));
         for (left, at) in &mut starts {
             *at = model.glance(points, at);
             *left = misfit(&model, at, points);
@@ -186,6 +185,34 @@ impl Selection<'_> {
             accepted: false,
         };
         Trial { term, ranked, state: None, leaves_nothing: false, model, fitted }
+    }
+
+    /// A law drawn around the declared one, with the terms as fitted.
+    fn drawn(&self, state: &State, number: usize) -> DVector<f64> {
+        let law = drawn_start(&state.model.coordinates, self.settings.seed, number);
+        let mut at = state.fitted.at.clone();
+        at.rows_mut(0, law.len()).copy_from(&law);
+        at
+    }
+
+    /// The starts of a term with these laws that leave least by this measure, and what they leave.
+    fn best_starts(
+        &self,
+        model: &Model,
+        term: &'static dyn Term,
+        laws: &[DVector<f64>],
+        left: impl Fn(&Model, &DVector<f64>, &Points) -> f64,
+    ) -> Vec<(f64, DVector<f64>)> {
+        let mut starts = Vec::new();
+        for values in term.starts() {
+            for law in laws {
+                let at = joined(law, term, &values);
+                starts.push((left(model, &at, self.points), at));
+            }
+        }
+        starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        starts.truncate(GLANCED);
+        starts
     }
 
     /// Rms change of the levels by a model with one more term, dB.
@@ -299,7 +326,19 @@ fn joined(at: &DVector<f64>, term: &dyn Term, values: &[f64]) -> DVector<f64> {
 
 /// Sum of the squared residuals of the detections over their spreads, dB².
 fn misfit(model: &Model, at: &DVector<f64>, points: &Points) -> f64 {
+    residuals_db(model, at, points).iter().map(|residual_db| residual_db.powi(2)).sum()
+}
+
+/// The same less that of the mean residual: a search finds the level in a step.
+fn scatter(model: &Model, at: &DVector<f64>, points: &Points) -> f64 {
+    let residual_db = residuals_db(model, at, points);
+    let mean_db = residual_db.iter().sum::<f64>() / residual_db.len().max(1) as f64;
+    residual_db.iter().map(|residual_db| (residual_db - mean_db).powi(2)).sum()
+}
+
+/// Residuals of the detections over their spreads, dB.
+fn residuals_db(model: &Model, at: &DVector<f64>, points: &Points) -> Vec<f64> {
     let levels_db = model.levels_db(at, &points.points);
     let pairs = points.points.iter().zip(levels_db).filter(|(point, _)| !point.censored);
-    pairs.map(|(point, db)| ((point.f_db - db) / point.spread).powi(2)).sum()
+    pairs.map(|(point, db)| (point.f_db - db) / point.spread).collect()
 }
