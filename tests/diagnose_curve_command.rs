@@ -82,7 +82,7 @@ fn a_report_is_complete_and_its_table_gives_its_errors() {
     let output = matdb(at).args(some).output().unwrap();
     let said = String::from_utf8(output.stdout).unwrap();
     assert!(
-        said.contains("before stray-light is blamed") && said.contains("--model mixture"),
+        said.contains("before stray-light is blamed, measure another sample on the same bench"),
         "{said}"
     );
     let left_out = json(&at.join("out/report.json"))["not_tried"].clone();
