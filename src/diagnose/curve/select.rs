@@ -161,7 +161,8 @@ impl Selection<'_> {
         let all = vec![true; points.points.len()];
         let model = state.model.with(term);
         let drawn = (1..=DRAWN).map(|number| self.drawn(state, number));
-        let mut starts = self.best_starts(&model, term, &[state.fitted.at.clone()], misfit);
+        let mut starts =
+            self.best_starts(&model, term, std::slice::from_ref(&state.fitted.at), misfit);
         starts.extend(self.best_starts(&model, term, &drawn.collect::<Vec<_>>(), scatter));
         for (left, at) in &mut starts {
             *at = model.glance(points, at);

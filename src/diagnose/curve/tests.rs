@@ -241,7 +241,7 @@ fn numbers_that_the_data_do_not_determine_do_not_count() {
     let report = diagnosed(&points);
     assert_eq!((report.verdict, report.base.law), (CurveVerdict::AnotherLaw, name), "{report:#?}");
     let fitted = Model::new(&law, Kind::Backscatter).unwrap();
-    let fit = fitted.fit(&points, &vec![true; 100], &fitted.start());
+    let fit = fitted.fit(&points, &[true; 100], &fitted.start());
     let counted = (fit.criterion() + fit.log_p) / (0.5 * 100f64.ln());
     assert_eq!((fitted.unknowns(), counted.round()), (5, 4.0), "{counted}");
 }
