@@ -11,7 +11,6 @@ use super::by_parts::ByParts;
 use super::coordinates::{Coordinates, frequencies};
 use super::error::FitError;
 use super::minimise::{Local, Minimise, Stop, step_each};
-use super::search::drawn_start;
 use crate::brdf::{Brdf, Scattering};
 use crate::frames::{Direction, Surface};
 use crate::units::db_from_ratio;
@@ -77,7 +76,7 @@ impl Bistatic {
         for number in 0..self.starts {
             let start = match number {
                 0 => coordinates.start(),
-                _ => drawn_start(&coordinates, self.seed, number),
+                _ => coordinates.drawn(self.seed, number),
             };
             let end = SEARCH.run_with(
                 &start,

@@ -10,6 +10,7 @@ use nalgebra::DVector;
 use super::error::FitError;
 use super::table::{Aspects, Table};
 use crate::brdf::{Brdf, Mixture, Parameter};
+use crate::radar::random::{Key, Purpose};
 
 /// Name of the specular level S = (1 − k)·f_λ.
 pub(crate) const SPECULAR_LEVEL: &str = "S";
@@ -269,6 +270,17 @@ impl Coordinates {
     /// The start of the search.
     pub fn start(&self) -> DVector<f64> {
         self.vector(|c| c.searched(c.start))
+    }
+
+    /// A start drawn around that of the search; `number` from 1.
+    pub fn drawn(&self, seed: u64, number: usize) -> DVector<f64> {
+        let key = Key { seed, chirp: number as u64, sub_ray: 1, purpose: Purpose::Fit };
+        let mut draws = key.draws();
+        let mut start = self.start();
+        for (u, coordinate) in start.iter_mut().zip(&self.list) {
+            *u += coordinate.spread() * (2.0 * draws.uniform() - 1.0);
+        }
+        start
     }
 
     /// Lower ends of the ranges, in the search.

@@ -36,7 +36,7 @@ mod parts;
 mod projection;
 mod result;
 mod run;
-pub(crate) mod search;
+mod search;
 mod sensitivity;
 mod settings;
 pub(crate) mod shapes;

@@ -12,7 +12,6 @@ use super::settings::{Fit, Method};
 use super::shapes;
 use super::uncertainty::{Uncertainty, observed_information};
 use crate::material::Observation;
-use crate::radar::random::{Key, Purpose};
 
 /// Most steps of one search.
 const ITERATIONS: usize = 200;
@@ -183,21 +182,10 @@ impl Fit {
             Method::Mse { .. } | Method::Censored => Vec::new(),
         };
         for number in starts.len() + 1..=wanted {
-            starts.push(drawn_start(coordinates, self.seed, number));
+            starts.push(coordinates.drawn(self.seed, number));
         }
         starts
     }
-}
-
-/// A start drawn around the given one; `number` from 1.
-pub(crate) fn drawn_start(coordinates: &Coordinates, seed: u64, number: usize) -> DVector<f64> {
-    let key = Key { seed, chirp: number as u64, sub_ray: 1, purpose: Purpose::Fit };
-    let mut draws = key.draws();
-    let mut start = coordinates.start();
-    for (u, coordinate) in start.iter_mut().zip(&coordinates.list) {
-        *u += coordinate.spread() * (2.0 * draws.uniform() - 1.0);
-    }
-    start
 }
 
 fn likelihood_search() -> Minimise {

@@ -35,12 +35,12 @@ impl Compared {
 
     pub fn in_report(&self, points: &Points) -> ComparedLaw {
         let State { model, fitted, .. } = &self.state;
-        let residual_db = points.residuals_db(&model.levels_db(&fitted.at, &points.points));
-        let seen = points.points.iter().zip(residual_db).filter(|(point, _)| !point.censored);
-        let squares: Vec<f64> = seen.map(|(_, residual)| residual * residual).collect();
+        let levels_db = model.levels_db(&fitted.at, &points.points);
+        let residual_db = points.detected_residuals_db(&levels_db);
+        let square_db2: f64 = residual_db.iter().map(|residual_db| residual_db.powi(2)).sum();
         ComparedLaw {
             name: self.name,
-            rms_db: (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt(),
+            rms_db: (square_db2 / residual_db.len().max(1) as f64).sqrt(),
             numbers: model.unknowns(),
             p_value: goodness(points, &self.state),
             explains: self.explains(),

@@ -36,11 +36,10 @@ pub(super) fn goodness(points: &Points, state: &State) -> Option<f64> {
 
 /// Mean square residual of the detections, per degree of freedom, dB², and that number.
 fn scatter_db2(points: &Points, State { model, fitted, .. }: &State) -> (f64, f64) {
-    let residual_db = points.residuals_db(&model.levels_db(&fitted.at, &points.points));
-    let seen = points.points.iter().zip(&residual_db).filter(|(point, _)| !point.censored);
-    let squares: Vec<f64> = seen.map(|(_, residual_db)| residual_db.powi(2)).collect();
-    let spare = squares.len().saturating_sub(model.unknowns()).max(1) as f64;
-    (squares.iter().sum::<f64>() / spare, spare)
+    let residual_db = points.detected_residuals_db(&model.levels_db(&fitted.at, &points.points));
+    let square_db2: f64 = residual_db.iter().map(|residual_db| residual_db.powi(2)).sum();
+    let spare = residual_db.len().saturating_sub(model.unknowns()).max(1) as f64;
+    (square_db2 / spare, spare)
 }
 
 /// More scatter than the noise has.

@@ -290,6 +290,12 @@ impl Model {
     }
 }
 
+/// Root mean square difference of two models' levels, dB.
+pub(super) fn rms_apart_db(a: &[f64], b: &[f64]) -> f64 {
+    let squares: f64 = a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum();
+    (squares / a.len().max(1) as f64).sqrt()
+}
+
 /// −ln p of points about a model's levels, dB.
 fn cost(points: &[Point], levels_db: &[f64], scale_db: f64) -> f64 {
     let pairs = points.iter().zip(levels_db);

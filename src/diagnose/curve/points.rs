@@ -258,6 +258,12 @@ impl Points {
         pairs.map(|(point, db)| (point.f_db - db) / point.spread).collect()
     }
 
+    /// The same of the detections alone.
+    pub(super) fn detected_residuals_db(&self, levels_db: &[f64]) -> Vec<f64> {
+        let pairs = self.points.iter().zip(self.residuals_db(levels_db));
+        pairs.filter(|(point, _)| !point.censored).map(|(_, residual_db)| residual_db).collect()
+    }
+
     /// The angle that a scan runs over, rad.
     pub fn angle_rad(&self, point: &Point) -> f64 {
         match self.kind {

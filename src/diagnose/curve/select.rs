@@ -6,11 +6,10 @@ use rayon::prelude::*;
 
 use super::evidence::{CurveEvidence, RankedTerm};
 use super::folds::Folds;
-use super::model::{Fit, Model, Score};
+use super::model::{Fit, Model, Score, rms_apart_db};
 use super::points::Points;
 use super::settings::CurveDiagnosis;
 use super::terms::Term;
-use crate::fit::search::drawn_start;
 
 /// Starts of a term with the fitted law of which the first steps are taken, and as many with laws drawn around the declared one.
 const GLANCED: usize = 64;
@@ -190,7 +189,7 @@ impl Selection<'_> {
 
     /// A law drawn around the declared one, with the terms as fitted.
     fn drawn(&self, state: &State, number: usize) -> DVector<f64> {
-        let law = drawn_start(&state.model.coordinates, self.settings.seed, number);
+        let law = state.model.coordinates.drawn(self.settings.seed, number);
         let mut at = state.fitted.at.clone();
         at.rows_mut(0, law.len()).copy_from(&law);
         at
@@ -221,8 +220,7 @@ impl Selection<'_> {
         let points = &self.points.points;
         let before = state.model.levels_db(&state.fitted.at, points);
         let after = model.levels_db(&fitted.at, points);
-        let squares: f64 = before.iter().zip(&after).map(|(a, b)| (a - b).powi(2)).sum();
-        (squares / before.len().max(1) as f64).sqrt()
+        rms_apart_db(&before, &after)
     }
 
     /// Searches a term once more from the law as declared and from laws beside the one found: the law without the term may
@@ -339,7 +337,5 @@ fn scatter(model: &Model, at: &DVector<f64>, points: &Points) -> f64 {
 
 /// Residuals of the detections over their spreads, dB.
 fn residuals_db(model: &Model, at: &DVector<f64>, points: &Points) -> Vec<f64> {
-    let levels_db = model.levels_db(at, &points.points);
-    let pairs = points.points.iter().zip(levels_db).filter(|(point, _)| !point.censored);
-    pairs.map(|(point, db)| (point.f_db - db) / point.spread).collect()
+    points.detected_residuals_db(&model.levels_db(at, &points.points))
 }

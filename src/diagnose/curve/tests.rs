@@ -214,6 +214,7 @@ fn what_neither_a_law_nor_a_term_is_like_stays_unknown() {
 
 #[test]
 fn an_effect_that_changes_little_has_no_name() {
+    const LITTLE: f64 = 0.001;
     let report = |light: f64| {
         let values = values_of("stray-light", &[light], 0.05);
         diagnosed(&curve_of(&values, Some(0.05)))
@@ -227,11 +228,10 @@ fn an_effect_that_changes_little_has_no_name() {
     assert!((0.1..0.3).contains(&light.size_db), "{light:?}");
     assert_eq!(more.effects[0].name, "stray-light", "{more:#?}");
 }
-const LITTLE: f64 = 0.001;
 
 #[test]
 fn numbers_that_the_data_do_not_determine_do_not_count() {
-    // An exponential correlation of k·s = 1.39 and k·l = 29.1: its permittivity and beam act only together.
+    // An exponential correlation of k·s = 1.39 and k·l = 29.1: the two parts of its permittivity act only together.
     let mut laws = laws::other_laws(&base_law());
     laws.retain(|(name, _)| *name == "kirchhoff with exponential correlation");
     let (name, mut law) = laws.pop().unwrap();

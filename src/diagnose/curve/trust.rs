@@ -1,9 +1,10 @@
 //! Whether terms that improve a model may be called by their names, and why not.
 
-use serde::Serialize;
-
 use std::f64::consts::TAU;
 
+use serde::Serialize;
+
+use super::model::rms_apart_db;
 use super::points::Points;
 use super::select::{Addition, State};
 use super::terms::{Term, ThinFilm};
@@ -54,14 +55,14 @@ pub(super) fn doubts(
     added: &[Addition],
 ) -> Vec<NameDoubt> {
     let (law, values) = after.model.numbers(&after.fitted.at);
-    let pairs = || added.iter().zip(&values);
-    let film = pairs().find(|(one, _)| one.term.name() == ThinFilm.name());
+    let pairs: Vec<(&Addition, &Vec<f64>)> = added.iter().zip(&values).collect();
+    let film = pairs.iter().find(|(one, _)| one.term.name() == ThinFilm.name());
     let shapes = added.iter().filter(|one| one.term.is_shape()).count();
     let is_small = added.iter().any(|one| one.evidence.size_db < least_db);
     let all = [
         (NameDoubt::NoiseUnknown, !points.has_known_noise()),
         (NameDoubt::Small, is_small || !all_matter(points, after, least_db)),
-        (NameDoubt::AtBound, pairs().any(|(one, values)| !is_inside(one.term, values))),
+        (NameDoubt::AtBound, pairs.iter().any(|(one, values)| !is_inside(one.term, values))),
         (
             NameDoubt::NoFringe,
             film.is_some_and(|(_, values)| fringes(points, &law, values) < LEAST_FRINGES),
@@ -99,8 +100,7 @@ fn all_matter(points: &Points, State { model, fitted, .. }: &State, least_db: f6
     let with = model.levels_db(&fitted.at, &points.points);
     (0..model.terms.len()).all(|term| {
         let without = model.levels_db(&model.without(&fitted.at, term), &points.points);
-        let squares: f64 = with.iter().zip(&without).map(|(a, b)| (a - b).powi(2)).sum();
-        squares >= least_db.powi(2) * with.len() as f64
+        rms_apart_db(&with, &without) >= least_db
     })
 }
 
