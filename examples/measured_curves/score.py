@@ -213,6 +213,7 @@ def main():
     parser.add_argument("--matdb", default="matdb")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--parts", default="ABC")
+    parser.add_argument("--due", action="store_true", help="of part B, ask only where a name is due")
     parser.add_argument("--count", type=int, default=10**9, help="the first curves of parts A and B, and of each kind of C")
     parser.add_argument("--record", help="a file of answers by this program: read first, and written at the end")
     parser.add_argument("--about", default="", help="first line of the record: the program's commit and the seed")
@@ -222,6 +223,8 @@ def main():
     with open(f"{a.folder}/truth.jsonl") as file:
         truths = [t for t in map(json.loads, file) if t["id"][0] in a.parts]
     truths = [t for t in truths if int(t["id"][2:].split("-")[-1]) < a.count]
+    if a.due:
+        truths = [t for t in truths if t["id"][0] != "B" or not t["reached"] or t["others_leave"] > DUE]
     # Curves without a name that is due come last.
     truths.sort(key=lambda t: (t["id"][0] != "A", t.get("others_leave", DUE + 1) <= DUE))
     asked = [t for t in truths if t.get("reached", True)]

@@ -10,7 +10,7 @@ use statrs::function::beta::beta_reg;
 
 use super::points::Kind;
 use super::points::{Point, Points};
-use super::terms::Term;
+use super::terms::{LawAt, Term};
 use crate::brdf::{Brdf, Scattering};
 use crate::fit::by_parts::ByParts;
 use crate::fit::coordinates::{Coordinates, frequencies};
@@ -148,25 +148,37 @@ impl Model {
     /// 10·lg f at every point.
     pub fn levels_db(&self, at: &DVector<f64>, points: &[Point]) -> Vec<f64> {
         let (law, values) = self.numbers(at);
-        let f_per_sr: Vec<f64> =
-            points.iter().map(|point| law.f_per_sr(point.i, point.o)).collect();
-        self.with_terms(&law, &f_per_sr, &values, points)
+        self.with_terms(&at_points(&law, points), &values)
     }
 
-    /// 10·lg f of a law with the terms of these parameters at every point; `f_per_sr` is that of the law alone.
-    fn with_terms(
+    /// 10·lg f of a law with the terms of these parameters at every point.
+    fn with_terms(&self, law: &[LawAt], values: &[Vec<f64>]) -> Vec<f64> {
+        law.iter().map(|at| level_db(self.f_per_sr(at, values))).collect()
+    }
+
+    /// f of a law with the terms of these parameters at a point, 1/sr.
+    fn f_per_sr(&self, at: &LawAt, values: &[Vec<f64>]) -> f64 {
+        let terms = self.terms.iter().zip(values);
+        terms.fold(at.f_per_sr, |f, (term, values)| term.scatter(values, at, f))
+    }
+
+    /// 10·lg f at every point with one more term, for each of these values of its parameters.
+    pub fn levels_with(
         &self,
-        law: &Brdf,
-        f_per_sr: &[f64],
+        at: &DVector<f64>,
+        term: &'static dyn Term,
         values: &[Vec<f64>],
         points: &[Point],
-    ) -> Vec<f64> {
-        let pairs = points.iter().zip(f_per_sr);
-        let with_terms = pairs.map(|(point, &of_law)| {
-            let terms = self.terms.iter().zip(values);
-            terms.fold(of_law, |f, (term, values)| term.scatter(values, law, point, f))
-        });
-        with_terms.map(|f_per_sr| db_from_ratio(f_per_sr.max(0.0)).max(NOTHING_DB)).collect()
+    ) -> Vec<Vec<f64>> {
+        let (law, before) = self.numbers(at);
+        let law = at_points(&law, points);
+        let f_per_sr: Vec<f64> = law.iter().map(|at| self.f_per_sr(at, &before)).collect();
+        let level_db =
+            |values: &[f64], (at, &f): (&LawAt, &f64)| level_db(term.scatter(values, at, f));
+        let levels = |values: &Vec<f64>| {
+            law.iter().zip(&f_per_sr).map(|pair| level_db(values, pair)).collect()
+        };
+        values.iter().map(levels).collect()
     }
 
     /// A fit to the points for which `used` is true, from a start.
@@ -241,11 +253,15 @@ impl Model {
         let directions: Vec<_> = points.iter().map(|point| [point.i, point.o]).collect();
         let (law, values) = self.numbers(at);
         let by_parts = ByParts::new(&law, &directions);
-        let here = self.with_terms(&law, &by_parts.f_per_sr(), &values, points);
+        let law_here = known_at_points(&law, by_parts.f_per_sr(), points);
+        let here = self.with_terms(&law_here, &values);
         let moved = step_each(at, upper, STEP, |there| {
-            let (law, values) = self.numbers(there);
-            let f_per_sr = by_parts.moved_to(&law, &directions).f_per_sr();
-            self.with_terms(&law, &f_per_sr, &values, points)
+            let (moved, values) = self.numbers(there);
+            if moved == law {
+                return self.with_terms(&law_here, &values);
+            }
+            let f_per_sr = by_parts.moved_to(&moved, &directions).f_per_sr();
+            self.with_terms(&known_at_points(&moved, f_per_sr, points), &values)
         });
         let mut sum = Local::zero(at.len());
         for (row, (point, level_db)) in points.iter().zip(&here).enumerate() {
@@ -288,6 +304,22 @@ impl Model {
         }
         all
     }
+}
+
+/// A law at every point.
+fn at_points<'a>(law: &'a Brdf, points: &'a [Point]) -> Vec<LawAt<'a>> {
+    let f_per_sr = points.iter().map(|point| law.f_per_sr(point.i, point.o));
+    known_at_points(law, f_per_sr.collect(), points)
+}
+
+/// A law at every point, of which f is known, 1/sr.
+fn known_at_points<'a>(law: &'a Brdf, f_per_sr: Vec<f64>, points: &'a [Point]) -> Vec<LawAt<'a>> {
+    points.iter().zip(f_per_sr).map(|(point, f)| LawAt::new(law, point, f)).collect()
+}
+
+/// 10·lg f.
+fn level_db(f_per_sr: f64) -> f64 {
+    db_from_ratio(f_per_sr.max(0.0)).max(NOTHING_DB)
 }
 
 /// Root mean square difference of two models' levels, dB.

@@ -161,11 +161,11 @@ impl Selection<'_> {
         let model = state.model.with(term);
         let drawn = (1..=DRAWN).map(|number| self.drawn(state, number));
         let mut starts =
-            self.best_starts(&model, term, std::slice::from_ref(&state.fitted.at), misfit);
-        starts.extend(self.best_starts(&model, term, &drawn.collect::<Vec<_>>(), scatter));
+            self.best_starts(state, term, std::slice::from_ref(&state.fitted.at), misfit);
+        starts.extend(self.best_starts(state, term, &drawn.collect::<Vec<_>>(), scatter));
         for (left, at) in &mut starts {
             *at = model.glance(points, at);
-            *left = misfit(&model, at, points);
+            *left = misfit(points, &model.levels_db(at, &points.points));
         }
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         let fits = starts.iter().take(FOLLOWED).map(|(_, at)| model.fit(points, &all, at));
@@ -198,17 +198,21 @@ impl Selection<'_> {
     /// The starts of a term with these laws that leave least by this measure, and what they leave.
     fn best_starts(
         &self,
-        model: &Model,
+        state: &State,
         term: &'static dyn Term,
         laws: &[DVector<f64>],
-        left: impl Fn(&Model, &DVector<f64>, &Points) -> f64,
+        left: impl Fn(&Points, &[f64]) -> f64,
     ) -> Vec<(f64, DVector<f64>)> {
+        let (points, values) = (self.points, term.starts());
         let mut starts = Vec::new();
-        for values in term.starts() {
-            for law in laws {
-                let at = joined(law, term, &values);
-                starts.push((left(model, &at, self.points), at));
-            }
+        for law in laws {
+            let levels = state.model.levels_with(law, term, &values, &points.points);
+            let pairs = values.iter().zip(&levels);
+            starts.extend(
+                pairs.map(|(values, levels_db)| {
+                    (left(points, levels_db), joined(law, term, values))
+                }),
+            );
         }
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         starts.truncate(GLANCED);
@@ -324,18 +328,14 @@ fn joined(at: &DVector<f64>, term: &dyn Term, values: &[f64]) -> DVector<f64> {
 }
 
 /// Sum of the squared residuals of the detections over their spreads, dB².
-fn misfit(model: &Model, at: &DVector<f64>, points: &Points) -> f64 {
-    residuals_db(model, at, points).iter().map(|residual_db| residual_db.powi(2)).sum()
+fn misfit(points: &Points, levels_db: &[f64]) -> f64 {
+    let residual_db = points.detected_residuals_db(levels_db);
+    residual_db.iter().map(|residual_db| residual_db.powi(2)).sum()
 }
 
 /// The same less that of the mean residual: a search finds the level in a step.
-fn scatter(model: &Model, at: &DVector<f64>, points: &Points) -> f64 {
-    let residual_db = residuals_db(model, at, points);
+fn scatter(points: &Points, levels_db: &[f64]) -> f64 {
+    let residual_db = points.detected_residuals_db(levels_db);
     let mean_db = residual_db.iter().sum::<f64>() / residual_db.len().max(1) as f64;
     residual_db.iter().map(|residual_db| (residual_db - mean_db).powi(2)).sum()
-}
-
-/// Residuals of the detections over their spreads, dB.
-fn residuals_db(model: &Model, at: &DVector<f64>, points: &Points) -> Vec<f64> {
-    points.detected_residuals_db(&model.levels_db(at, &points.points))
 }

@@ -2,6 +2,7 @@
 //!
 //! With its parameters at their `absent` values a term changes nothing, exactly.
 
+use std::cell::OnceCell;
 use std::f64::consts::{PI, TAU};
 
 use super::points::Point;
@@ -35,7 +36,40 @@ pub trait Term: Sync {
     fn starts(&self) -> Vec<Vec<f64>>;
 
     /// f with this term at a point, 1/sr; `f_per_sr` is f without it.
-    fn scatter(&self, values: &[f64], law: &Brdf, point: &Point, f_per_sr: f64) -> f64;
+    fn scatter(&self, values: &[f64], at: &LawAt, f_per_sr: f64) -> f64;
+}
+
+/// A scattering model at a point. What its terms need of it is computed once.
+pub struct LawAt<'a> {
+    law: &'a Brdf,
+    point: &'a Point,
+    /// f of the model alone, 1/sr.
+    pub f_per_sr: f64,
+    parts_per_sr: OnceCell<[f64; 2]>,
+}
+
+impl<'a> LawAt<'a> {
+    /// A scattering model of which f at this point is known, 1/sr.
+    pub fn new(law: &'a Brdf, point: &'a Point, f_per_sr: f64) -> LawAt<'a> {
+        LawAt { law, point, f_per_sr, parts_per_sr: OnceCell::new() }
+    }
+
+    /// Its specular and its diffuse part, 1/sr.
+    fn parts_per_sr(&self) -> [f64; 2] {
+        *self.parts_per_sr.get_or_init(|| {
+            let Seen { f_per_sr, specular_share, .. } =
+                self.law.seen_by(0.0, self.point.i, self.point.o);
+            [specular_share, 1.0 - specular_share].map(|share| share * f_per_sr)
+        })
+    }
+
+    /// Sum of its Cook–Torrance lobes, each times a factor, 1/sr.
+    fn lobes_per_sr(&self, factor: &dyn Fn(&CookTorrance) -> f64) -> f64 {
+        self.law.sum_over_parts(&|part| match part {
+            Brdf::CookTorrance(lobe) => factor(lobe) * part.f_per_sr(self.point.i, self.point.o),
+            _ => 0.0,
+        })
+    }
 }
 
 /// Every term, in the order in which they act.
@@ -90,30 +124,11 @@ macro_rules! described {
     };
 }
 
-/// The specular and the diffuse part of a law at a point, 1/sr.
-fn parts_per_sr(law: &Brdf, point: &Point) -> [f64; 2] {
-    let Seen { f_per_sr, specular_share, .. } = law.seen_by(0.0, point.i, point.o);
-    [specular_share, 1.0 - specular_share].map(|share| share * f_per_sr)
-}
-
-/// The diffuse part of a law at a point, 1/sr.
-fn diffuse_per_sr(law: &Brdf, point: &Point) -> f64 {
-    parts_per_sr(law, point)[1]
-}
-
 /// Cosine between the normal and the half direction, and between that and the receiver.
 fn half(point: &Point) -> [f64; 2] {
     let sum = point.i.xyz() + point.o.xyz();
     let h = sum / sum.length().max(f64::MIN_POSITIVE);
     [h.z, point.o.xyz().dot(h)].map(|cos: f64| cos.clamp(0.0, 1.0))
-}
-
-/// Sum of the Cook–Torrance lobes of a scattering model, each times a factor, 1/sr.
-fn lobes_per_sr(law: &Brdf, point: &Point, factor: &dyn Fn(&CookTorrance) -> f64) -> f64 {
-    law.sum_over_parts(&|part| match part {
-        Brdf::CookTorrance(lobe) => factor(lobe) * part.f_per_sr(point.i, point.o),
-        _ => 0.0,
-    })
 }
 
 struct DiffuseLobe;
@@ -137,10 +152,10 @@ impl Term for DiffuseLobe {
         [0.3, 2.0, 8.0].map(|alpha| vec![alpha]).to_vec()
     }
 
-    fn scatter(&self, values: &[f64], law: &Brdf, point: &Point, f_per_sr: f64) -> f64 {
+    fn scatter(&self, values: &[f64], at: &LawAt, f_per_sr: f64) -> f64 {
         let &[alpha] = values else { return f_per_sr };
-        let shape = (alpha + 2.0) / 2.0 * half(point)[0].powf(alpha);
-        f_per_sr + diffuse_per_sr(law, point) * (shape - 1.0)
+        let shape = (alpha + 2.0) / 2.0 * half(at.point)[0].powf(alpha);
+        f_per_sr + at.parts_per_sr()[1] * (shape - 1.0)
     }
 }
 
@@ -168,10 +183,10 @@ impl Term for LimbDarkening {
         [-0.3, 0.3].map(|k| vec![k]).to_vec()
     }
 
-    fn scatter(&self, values: &[f64], law: &Brdf, point: &Point, f_per_sr: f64) -> f64 {
+    fn scatter(&self, values: &[f64], at: &LawAt, f_per_sr: f64) -> f64 {
         let &[k] = values else { return f_per_sr };
-        let shape = (point.i.cos_theta() * point.o.cos_theta()).max(LEAST_COS).powf(k);
-        f_per_sr + diffuse_per_sr(law, point) * (shape - 1.0)
+        let cosines = at.point.i.cos_theta() * at.point.o.cos_theta();
+        f_per_sr + at.parts_per_sr()[1] * (cosines.max(LEAST_COS).powf(k) - 1.0)
     }
 }
 
@@ -198,13 +213,13 @@ impl Term for SecondLobe {
         pairs(&[1e-3, 1e-2, 0.1], &[0.03, 0.1, 0.3, 0.8])
     }
 
-    fn scatter(&self, values: &[f64], _: &Brdf, point: &Point, f_per_sr: f64) -> f64 {
+    fn scatter(&self, values: &[f64], at: &LawAt, f_per_sr: f64) -> f64 {
         let &[f_lambda, m] = values else { return f_per_sr };
         let (distribution, shadowing) = (Distribution::Ggx, Shadowing::Separable);
         let lobe = CookTorrance { f_lambda, m, m_across: None, distribution, shadowing };
         // Schlick's factor does not vanish with f_λ.
         let share = f_lambda / (f_lambda + 1e-6);
-        f_per_sr + share * lobe.f_per_sr(point.i, point.o)
+        f_per_sr + share * lobe.f_per_sr(at.point.i, at.point.o)
     }
 }
 
@@ -226,13 +241,13 @@ impl Term for FresnelGrowth {
         [-6.0, -1.0, 1.0, 6.0].map(|db| vec![db]).to_vec()
     }
 
-    fn scatter(&self, values: &[f64], law: &Brdf, point: &Point, f_per_sr: f64) -> f64 {
+    fn scatter(&self, values: &[f64], at: &LawAt, f_per_sr: f64) -> f64 {
         let &[level_db] = values else { return f_per_sr };
         let amount = 10f64.powf(0.1 * level_db);
-        let growth = (1.0 - half(point)[1]).powi(5);
+        let growth = (1.0 - half(at.point)[1]).powi(5);
         let schlick = |r0: f64| r0 + (1.0 - r0) * growth;
         f_per_sr
-            + lobes_per_sr(law, point, &|lobe| {
+            + at.lobes_per_sr(&|lobe| {
                 let f = lobe.f_lambda.max(1e-9);
                 amount * schlick((f / amount).min(1.0)) / schlick(f) - 1.0
             })
@@ -256,9 +271,9 @@ impl Term for Subsurface {
         [5e-4, 5e-3, 5e-2].map(|sigma_v| vec![sigma_v]).to_vec()
     }
 
-    fn scatter(&self, values: &[f64], _: &Brdf, point: &Point, f_per_sr: f64) -> f64 {
+    fn scatter(&self, values: &[f64], at: &LawAt, f_per_sr: f64) -> f64 {
         let &[sigma_v] = values else { return f_per_sr };
-        let cos = [point.i, point.o].map(|d| d.cos_theta().max(LEAST_COS));
+        let cos = [at.point.i, at.point.o].map(|d| d.cos_theta().max(LEAST_COS));
         f_per_sr + sigma_v / (4.0 * PI * cos[0] * cos[1])
     }
 }
@@ -286,10 +301,10 @@ impl Term for ThinFilm {
         pairs(&[-0.5, -0.2, 0.2, 0.5], &thicknesses)
     }
 
-    fn scatter(&self, values: &[f64], law: &Brdf, point: &Point, f_per_sr: f64) -> f64 {
+    fn scatter(&self, values: &[f64], at: &LawAt, f_per_sr: f64) -> f64 {
         let &[visibility, _] = values else { return f_per_sr };
-        let phase_rad = ThinFilm::phase_rad(values, point);
-        f_per_sr + parts_per_sr(law, point)[0] * visibility * phase_rad.cos()
+        let phase_rad = ThinFilm::phase_rad(values, at.point);
+        f_per_sr + at.parts_per_sr()[0] * visibility * phase_rad.cos()
     }
 }
 
@@ -325,9 +340,9 @@ impl Term for Opposition {
         pairs(&[0.1, 0.5], &[2.0, 6.0, 15.0])
     }
 
-    fn scatter(&self, values: &[f64], _: &Brdf, point: &Point, f_per_sr: f64) -> f64 {
+    fn scatter(&self, values: &[f64], at: &LawAt, f_per_sr: f64) -> f64 {
         let &[height, width_deg] = values else { return f_per_sr };
-        let apart_rad = point.i.xyz().dot(point.o.xyz()).clamp(-1.0, 1.0).acos();
+        let apart_rad = at.point.i.xyz().dot(at.point.o.xyz()).clamp(-1.0, 1.0).acos();
         f_per_sr * (1.0 + height * (-apart_rad / width_deg.to_radians()).exp())
     }
 }
@@ -349,9 +364,10 @@ impl Term for AngleOffset {
         [-9.0, -6.0, -3.0, -1.0, 1.0, 3.0, 6.0, 9.0].map(|offset| vec![offset]).to_vec()
     }
 
-    fn scatter(&self, values: &[f64], law: &Brdf, point: &Point, f_per_sr: f64) -> f64 {
+    fn scatter(&self, values: &[f64], at: &LawAt, f_per_sr: f64) -> f64 {
         const GRAZING_RAD: f64 = 1.57;
         let &[offset_deg] = values else { return f_per_sr };
+        let LawAt { law, point, .. } = *at;
         // In backscatter the source moves with the receiver, on its own side.
         let is_backscatter = point.i == point.o;
         let theta_rad = if is_backscatter {
@@ -362,8 +378,7 @@ impl Term for AngleOffset {
         let theta_rad = theta_rad.clamp(-GRAZING_RAD, GRAZING_RAD);
         let o = Direction::from_angles(theta_rad.abs(), if theta_rad < 0.0 { PI } else { 0.0 });
         let i = if is_backscatter { o } else { point.i };
-        let here = law.f_per_sr(point.i, point.o);
-        let ratio = if here > 0.0 { law.f_per_sr(i, o) / here } else { 1.0 };
+        let ratio = if at.f_per_sr > 0.0 { law.f_per_sr(i, o) / at.f_per_sr } else { 1.0 };
         // σ⁰ = 4π·f·cos²θ was turned into f at the angle of the file.
         let cosines = if is_backscatter { o.cos_theta() / point.o.cos_theta() } else { 1.0 };
         f_per_sr * ratio * cosines.powi(2)
@@ -387,9 +402,9 @@ impl Term for InstrumentLobe {
         pairs(&[1e-3, 1e-1, 10.0], &[0.5, 1.5, 4.0])
     }
 
-    fn scatter(&self, values: &[f64], _: &Brdf, point: &Point, f_per_sr: f64) -> f64 {
+    fn scatter(&self, values: &[f64], at: &LawAt, f_per_sr: f64) -> f64 {
         let &[level_per_sr, width_deg] = values else { return f_per_sr };
-        let (i, o) = (point.i.xyz(), point.o.xyz());
+        let (i, o) = (at.point.i.xyz(), at.point.o.xyz());
         let off_rad = (2.0 * i.z * o.z - i.dot(o)).clamp(-1.0, 1.0).acos();
         f_per_sr + level_per_sr * (-0.5 * (off_rad / width_deg.to_radians()).powi(2)).exp()
     }
@@ -412,9 +427,9 @@ impl Term for StrayLight {
         [-1e-3, -1e-4, 1e-4, 1e-3].map(|s| vec![s]).to_vec()
     }
 
-    fn scatter(&self, values: &[f64], _: &Brdf, point: &Point, f_per_sr: f64) -> f64 {
+    fn scatter(&self, values: &[f64], at: &LawAt, f_per_sr: f64) -> f64 {
         let &[s_per_sr] = values else { return f_per_sr };
-        f_per_sr + s_per_sr / point.o.cos_theta().max(LEAST_COS)
+        f_per_sr + s_per_sr / at.point.o.cos_theta().max(LEAST_COS)
     }
 }
 
@@ -432,7 +447,7 @@ mod tests {
             let change = |values: &[f64]| {
                 let one = |point: &Point| {
                     let f = law.f_per_sr(point.i, point.o);
-                    (term.scatter(values, &law, point, f) / f - 1.0).abs()
+                    (term.scatter(values, &LawAt::new(&law, point, f), f) / f - 1.0).abs()
                 };
                 points.iter().map(one).fold(0.0, f64::max)
             };
@@ -454,7 +469,8 @@ mod tests {
         law.set_parameter("1.m", 0.03);
         let points = in_plane(&law, &[40.0], 1.0);
         let seen = |point: &Point| {
-            AngleOffset.scatter(&[3.0], &law, point, law.f_per_sr(point.i, point.o))
+            let f = law.f_per_sr(point.i, point.o);
+            AngleOffset.scatter(&[3.0], &LawAt::new(&law, point, f), f)
         };
         let peak = |f: &dyn Fn(&Point) -> f64| {
             points.iter().max_by(|a, b| f(a).total_cmp(&f(b))).unwrap().theta_s_rad.to_degrees()

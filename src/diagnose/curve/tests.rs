@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use nalgebra::DVector;
 
 use super::model::Model;
+use super::terms::LawAt;
 use super::testing::{curve_of, noisy};
 use super::*;
 use crate::brdf::{Brdf, KirchhoffGo, Scattering};
@@ -37,7 +38,7 @@ fn values_of(name: &str, numbers: &[f64], noise_db: f64) -> Vec<InPlane> {
     let (law, term) = (law(), term(name));
     noisy(&INCIDENCES_DEG, 2.0, noise_db, |point| {
         let f = law.f_per_sr(point.i, point.o);
-        db_from_ratio(term.map_or(f, |term| term.scatter(numbers, &law, point, f)))
+        db_from_ratio(term.map_or(f, |term| term.scatter(numbers, &LawAt::new(&law, point, f), f)))
     })
 }
 
@@ -105,7 +106,8 @@ fn an_offset_of_the_angle_is_found_within_its_deviations() {
         let values = noisy(&INCIDENCES_DEG, 2.0, 0.0, |point| {
             count.set(count.get() + 1);
             let f = law.f_per_sr(point.i, point.o);
-            let level_db = db_from_ratio(term.scatter(&[OFFSET_DEG], &law, point, f));
+            let level_db =
+                db_from_ratio(term.scatter(&[OFFSET_DEG], &LawAt::new(&law, point, f), f));
             level_db + NOISE_DB * testing::normal(count.get())
         });
         curve_of(&values, Some(NOISE_DB))
@@ -173,7 +175,7 @@ fn beside_another_law_no_effect_has_a_name() {
     ] {
         let values = noisy(&INCIDENCES_DEG, 2.0, NOISE_DB, |point| {
             let f = law.f_per_sr(point.i, point.o);
-            db_from_ratio(term(name).unwrap().scatter(&numbers, &law, point, f))
+            db_from_ratio(term(name).unwrap().scatter(&numbers, &LawAt::new(&law, point, f), f))
         });
         let points = curve_of(&values, Some(NOISE_DB));
         let report = CurveDiagnosis::default().run(&points, &base_law(), &tried).unwrap();
@@ -331,7 +333,8 @@ fn backscatter_with(
     backscatter_of(step_deg, 60, noise_db, |theta_rad| {
         let point = &points[(theta_rad.to_degrees() / step_deg).round() as usize];
         let f_per_sr = law.f_per_sr(point.i, point.o);
-        law.sigma0(theta_rad) * term.scatter(numbers, law, point, f_per_sr) / f_per_sr
+        let at = LawAt::new(law, point, f_per_sr);
+        law.sigma0(theta_rad) * term.scatter(numbers, &at, f_per_sr) / f_per_sr
     })
 }
 
