@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::support::{entries, matdb, refused};
 use matdb::brdf::Scattering;
-use matdb::diagnose::curve::{Points, base_law, term};
+use matdb::diagnose::curve::{LawAt, Points, base_law, term};
 use matdb::material::file::in_plane::InPlane;
 use matdb::measure::Curve;
 use serde_json::Value;
@@ -36,7 +36,7 @@ fn table(name: &str, numbers: &[f64]) -> String {
     let mut text = "theta_i_deg,theta_s_deg,brdf_per_sr\n".to_owned();
     for (k, point) in points.iter().enumerate() {
         let f = law.f_per_sr(point.i, point.o);
-        let f = term(name).map_or(f, |term| term.scatter(numbers, &law, point, f));
+        let f = term(name).map_or(f, |term| term.scatter(numbers, &LawAt::new(&law, point, f), f));
         // About 0.2 dB of scatter that has no period.
         let scatter = 1.0 + 0.07 * ((k * k) as f64 * 0.754_877_666).fract() - 0.035;
         let [i, s] = [point.theta_i_rad, point.theta_s_rad].map(|x: f64| x.to_degrees().round());

@@ -47,5 +47,5 @@ pub use report::{
     CurveRow, CurveUnknown, CurveVerdict, FoundTerm,
 };
 pub use settings::CurveDiagnosis;
-pub use terms::{Term, term, terms};
+pub use terms::{LawAt, Term, term, terms};
 pub use trust::NameDoubt;
