@@ -78,6 +78,7 @@ impl Term {
 
     /// Share of it, 0 to 1, that comes back in one phase to a beam of a divergence, rad: all of a mirror, whose lobe is the
     /// beam's.
+    #[inline(always)]
     pub(crate) fn coherent_share(&self, beam_rad: f64) -> f64 {
         match self.facets {
             None => 0.0,

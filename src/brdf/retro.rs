@@ -1,7 +1,7 @@
 //! A law that is asked for backscatter only: by its closed form in vector instructions, where it has one.
 
 use super::backscatter::{GRAZING, Look, Term};
-use super::scattering::Scattering;
+use super::scattering::{Scattering, Seen};
 use crate::frames::{Direction, Surface};
 use crate::lanes::{Wide, widest};
 
@@ -19,24 +19,98 @@ impl<'a> Retro<'a> {
     /// f in exact backscatter, 1/sr, of each direction to the radar with the divergence, rad, of the beam along it.
     pub(crate) fn per_sr(&self, to_radar: &[(f64, Direction<Surface>)]) -> Vec<f64> {
         let Some(terms) = &self.terms else {
-            return to_radar.iter().map(|(beam_rad, v)| self.alone(*beam_rad, *v)).collect();
+            return to_radar.iter().map(|look| self.alone(look).f_per_sr).collect();
         };
-        let looks =
-            to_radar.iter().map(|&(beam_rad, v)| Look { beam_rad, cos_theta: v.cos_theta() });
-        let looks: Vec<Look> = looks.collect();
+        let looks = looks(to_radar);
         let mut f_per_sr = vec![0.0; looks.len()];
         widest(Sum { terms, looks: &looks, f_per_sr: &mut f_per_sr });
-        for (f_per_sr, (beam_rad, v)) in f_per_sr.iter_mut().zip(to_radar) {
-            if v.cos_theta() <= GRAZING {
-                *f_per_sr = self.alone(*beam_rad, *v);
+        for (f_per_sr, look) in f_per_sr.iter_mut().zip(to_radar) {
+            if look.1.cos_theta() <= GRAZING {
+                *f_per_sr = self.alone(look).f_per_sr;
             }
         }
         f_per_sr
     }
 
-    /// f in one direction, by the law itself.
-    fn alone(&self, beam_rad: f64, v: Direction<Surface>) -> f64 {
-        self.law.seen_by(beam_rad, v, v).f_per_sr
+    /// What a beam sees in exact backscatter, of each direction to the radar with the divergence, rad, of the beam along it.
+    pub(crate) fn seen(&self, to_radar: &[(f64, Direction<Surface>)]) -> Vec<Seen> {
+        let Some(terms) = &self.terms else {
+            return to_radar.iter().map(|look| self.alone(look)).collect();
+        };
+        let looks = looks(to_radar);
+        let mut parts = Parts::of(looks.len());
+        widest(Split { terms, looks: &looks, parts: &mut parts });
+        let of_looks = to_radar.iter().enumerate().map(|(place, look)| {
+            if look.1.cos_theta() > GRAZING { parts.seen(place) } else { self.alone(look) }
+        });
+        of_looks.collect()
+    }
+
+    /// What a beam sees in one direction, by the law itself.
+    fn alone(&self, &(beam_rad, v): &(f64, Direction<Surface>)) -> Seen {
+        self.law.seen_by(beam_rad, v, v)
+    }
+}
+
+fn looks(to_radar: &[(f64, Direction<Surface>)]) -> Vec<Look> {
+    let looks = to_radar.iter().map(|&(beam_rad, v)| Look { beam_rad, cos_theta: v.cos_theta() });
+    looks.collect()
+}
+
+/// f of many looks, 1/sr, and the parts of it that are specular and coherent.
+struct Parts {
+    all: Vec<f64>,
+    specular: Vec<f64>,
+    coherent: Vec<f64>,
+    /// One term's part.
+    of_term: Vec<f64>,
+}
+
+impl Parts {
+    fn of(looks: usize) -> Parts {
+        let [all, specular, coherent, of_term] = [(); 4].map(|()| vec![0.0; looks]);
+        Parts { all, specular, coherent, of_term }
+    }
+
+    fn seen(&self, place: usize) -> Seen {
+        let f_per_sr = self.all[place];
+        let [specular_share, coherent_share] = [&self.specular, &self.coherent]
+            .map(|parts| if f_per_sr > 0.0 { parts[place] / f_per_sr } else { 0.0 });
+        Seen { f_per_sr, specular_share, coherent_share }
+    }
+}
+
+/// The sums of terms for many looks.
+struct Split<'a> {
+    terms: &'a [Term],
+    looks: &'a [Look],
+    parts: &'a mut Parts,
+}
+
+impl Wide for Split<'_> {
+    type Answer = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Parts { all, specular, coherent, of_term } = self.parts;
+        for term in self.terms {
+            of_term.fill(0.0);
+            term.add_per_sr(self.looks, of_term);
+            add(all, of_term);
+            if term.facets.is_some() {
+                add(specular, of_term);
+                for ((sum, part), look) in coherent.iter_mut().zip(&*of_term).zip(self.looks) {
+                    *sum += part * term.coherent_share(look.beam_rad);
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn add(sums: &mut [f64], parts: &[f64]) {
+    for (sum, part) in sums.iter_mut().zip(parts) {
+        *sum += part;
     }
 }
 
@@ -82,6 +156,30 @@ mod tests {
     fn expected(model: &Brdf) -> Vec<f64> {
         let seen = |(beam_rad, v): (f64, _)| model.seen_by(beam_rad, v, v).f_per_sr;
         looks().into_iter().map(seen).collect()
+    }
+
+    #[test]
+    fn the_parts_are_those_of_the_law() {
+        let mut compared = 0;
+        for model in every_model() {
+            for (found, (beam_rad, v)) in Retro::new(&model).seen(&looks()).iter().zip(looks()) {
+                let expected = model.seen_by(beam_rad, v, v);
+                let near = (found.f_per_sr - expected.f_per_sr).abs() <= 1e-9 * expected.f_per_sr;
+                if expected.f_per_sr < NOTHING {
+                    continue;
+                }
+                let apart = [
+                    found.specular_share - expected.specular_share,
+                    found.coherent_share - expected.coherent_share,
+                ];
+                assert!(
+                    near && apart.iter().all(|apart| apart.abs() < 1e-9),
+                    "{model:?} at {beam_rad} {v:?}: {found:?} {expected:?}"
+                );
+                compared += 1;
+            }
+        }
+        assert!(compared > 10_000, "{compared}");
     }
 
     /// Levels below any receiver's, where f of a narrow lobe underflows.

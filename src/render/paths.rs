@@ -11,6 +11,8 @@
 //! Where a path crosses sheets, it loses power and seems longer by what `sheet.rs` says. A sheet is also a surface: every
 //! ray has a single path from each sheet that it meets, and from what lies behind.
 
+use std::convert::Infallible;
+
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -24,13 +26,13 @@ use super::setup::Setup;
 use super::sheet::{Passage, passed_share};
 use super::spot::{self, Footprints, Spot};
 use super::surface::{Orientation, Surface};
-use crate::brdf::{NarrowLobe, Seen};
+use crate::brdf::{NarrowLobe, Retro, Seen};
 use crate::effects::MeanEcho;
 use crate::frames::{Direction, Global, Point, Ray, Surface as Local};
 use crate::radar::jones::Field;
 use crate::radar::random::{Key, Purpose};
 use crate::radar::{Channel, Detection, Link};
-use crate::trace::{Hit, LocalFrame, ScanGeometry};
+use crate::trace::{Hit, LocalFrame};
 
 /// Computes the paths of a scan to one antenna.
 pub(super) struct Paths<'a> {
@@ -44,6 +46,8 @@ pub(super) struct Paths<'a> {
     effects: Option<EffectScan<'a>>,
     /// The smooth piece that each facet belongs to; empty where no spot can reach beyond what returns a wave.
     pieces: Vec<u32>,
+    /// The laws of the regions as the radar sees them; empty for another observer.
+    retros: Vec<Retro<'a>>,
     /// The change of each chirp's whole echo by the effects; empty without effects.
     changes: Vec<Option<Change>>,
 }
@@ -77,6 +81,16 @@ struct ShadingPoint<'a> {
     beam_rad: f64,
     /// The sheets on the way of the ray that illuminates it.
     inward: Passage,
+}
+
+/// A point of the target in a ray of a chirp.
+struct Lit<'a> {
+    /// Place of the chirp among those that are computed at once.
+    chirp: usize,
+    /// Number of the ray in its spot.
+    sample: usize,
+    ray: Ray<Global>,
+    point: ShadingPoint<'a>,
 }
 
 /// What a channel of the antenna receives of the power on a path.
@@ -138,6 +152,12 @@ impl<'a> Paths<'a> {
             }
             _ => Vec::new(),
         };
+        let retros = match observer {
+            Observer::Radar => {
+                setup.surfaces.iter().map(|surface| Retro::new(surface.scattering)).collect()
+            }
+            Observer::Receiver { .. } => Vec::new(),
+        };
         let mut paths = Paths {
             setup,
             observer,
@@ -147,6 +167,7 @@ impl<'a> Paths<'a> {
             footprints,
             effects,
             pieces,
+            retros,
             changes: Vec::new(),
         };
         paths.changes =
@@ -168,14 +189,74 @@ impl<'a> Paths<'a> {
 
     /// All paths of a chirp through the hits of its rays, including single paths without power.
     pub fn of_chirp(&self, number: usize, hits: &[Option<Hit>]) -> Vec<Path> {
-        let mut paths = Vec::with_capacity(hits.len());
-        self.fill(number, hits, &mut paths);
-        paths
+        let mut of_chirp = Vec::new();
+        let Ok(()) = self.for_each_chirp::<Infallible>(number, hits.len(), hits, |_, paths| {
+            of_chirp.append(paths);
+            Ok(())
+        });
+        of_chirp
     }
 
-    /// As [`of_chirp`](Self::of_chirp), into a list whose contents it replaces.
-    pub fn fill(&self, number: usize, hits: &[Option<Hit>], paths: &mut Vec<Path>) {
-        paths.clear();
+    /// Calls `each` with the number of each chirp from `first` on and all its paths. The laws of all these chirps are
+    /// evaluated at once. The first error ends it.
+    pub fn for_each_chirp<E>(
+        &self,
+        first: usize,
+        rays: usize,
+        hits: &[Option<Hit>],
+        mut each: impl FnMut(usize, &mut Vec<Path>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let chirps = (first..).zip(hits.chunks(rays));
+        let sent: Vec<Emission> = chirps.map(|(number, hits)| self.sent(number, hits)).collect();
+        let mut lit = Vec::with_capacity(hits.len());
+        for (chirp, (emission, hits)) in sent.iter().zip(hits.chunks(rays)).enumerate() {
+            emission.light(chirp, hits, &mut lit);
+        }
+        let seen = self.seen(&sent, &lit);
+        let mut lit = lit.into_iter().zip(seen).peekable();
+        let (mut paths, mut direct) = (Vec::new(), Vec::new());
+        for (chirp, emission) in sent.iter().enumerate() {
+            paths.clear();
+            direct.clear();
+            while let Some((lit, seen)) = lit.next_if(|(lit, _)| lit.chirp == chirp) {
+                direct.push(RayPath { ray: lit.sample, place: paths.len() });
+                emission.scatter(&lit, seen, &mut paths);
+            }
+            self.finish(emission.number, &direct, &mut paths);
+            each(emission.number, &mut paths)?;
+        }
+        Ok(())
+    }
+
+    /// What each point that is lit scatters towards the antenna.
+    fn seen(&self, sent: &[Emission], lit: &[Lit]) -> Vec<Seen> {
+        if self.retros.is_empty() {
+            return lit.iter().map(|lit| sent[lit.chirp].scattered(&lit.point)).collect();
+        }
+        let regions: Vec<usize> = lit.iter().map(|lit| self.region(&lit.point.hit)).collect();
+        let mut by_region: Vec<usize> = (0..lit.len()).collect();
+        by_region.sort_by_key(|&place| regions[place]);
+        let mut seen = vec![Seen::default(); lit.len()];
+        for here in by_region.chunk_by(|&a, &b| regions[a] == regions[b]) {
+            let number = regions[here[0]];
+            let (retro, surface) = (&self.retros[number], &self.setup.surfaces[number]);
+            let look = |&place: &usize| (lit[place].point.beam_rad, lit[place].point.source);
+            for (place, of_look) in
+                here.iter().zip(surface.seen_straight_back(retro, here.iter().map(look)))
+            {
+                seen[*place] = of_look;
+            }
+        }
+        seen
+    }
+
+    /// Number of the region that a hit lies on.
+    fn region(&self, hit: &Hit) -> usize {
+        usize::from(self.setup.geometry.region_of_facet[hit.facet as usize])
+    }
+
+    /// What is common to the rays of a chirp.
+    fn sent(&self, number: usize, hits: &[Option<Hit>]) -> Emission<'_> {
         let axis = &self.setup.geometry.chirps.rays[number];
         let antenna = self.observer.position(axis.origin.xyz);
         let range_m = self.footprints.axis_range_m[number];
@@ -184,27 +265,14 @@ impl<'a> Paths<'a> {
             _ => Spot::met(&self.link.beam, axis, range_m, number),
         };
         let tilts = self.effects.as_ref().map_or([0.0; 2], |effects| effects.tilts(number));
-        let sent = Emission { paths: self, number, spot, antenna, rays: hits.len(), tilts };
-        let has_pieces = !self.pieces.is_empty();
-        let mut direct = Vec::new();
-        for (sample, hit) in hits.iter().enumerate() {
-            let Some((hit, ray)) = hit.zip(spot.ray(self.samples[sample])) else { continue };
-            direct.extend(has_pieces.then_some(RayPath { ray: sample, place: paths.len() }));
-            sent.scatter(hit, Passage::FREE, &ray, sample, paths);
-            // Behind every sheet that the ray meets lies something else, or nothing.
-            let (mut front, mut inward) = (hit, Passage::FREE);
-            for behind in &self.footprints.behind {
-                let Some(sheet) = self.setup.sheet(front.facet) else { break };
-                let Some(hit) = behind.hits[number * hits.len() + sample] else { break };
-                inward = inward.then(passage(self.setup, sheet, &front, ray.direction));
-                direct.extend(has_pieces.then_some(RayPath { ray: sample, place: paths.len() }));
-                sent.scatter(hit, inward, &ray, sample, paths);
-                front = hit;
-            }
-        }
-        if has_pieces {
+        Emission { paths: self, number, spot, antenna, rays: hits.len(), tilts }
+    }
+
+    /// Changes the paths of a chirp by what depends on all of them; `direct` are those by way of one surface.
+    fn finish(&self, number: usize, direct: &[RayPath], paths: &mut [Path]) {
+        if !self.pieces.is_empty() {
             let rays = SpotRays { places: &self.samples, lit_shares: &self.lit_shares };
-            rays.cut_waves(&direct, paths);
+            rays.cut_waves(direct, paths);
         }
         if let Some(change) = self.changes.get(number).copied().flatten() {
             change.apply(paths);
@@ -213,18 +281,30 @@ impl<'a> Paths<'a> {
 }
 
 impl<'a> Emission<'a> {
-    /// Appends the paths by way of the hit of a ray, which comes by the way `inward`.
-    fn scatter(
-        &self,
-        hit: Hit,
-        inward: Passage,
-        ray: &Ray<Global>,
-        sample: usize,
-        paths: &mut Vec<Path>,
-    ) {
+    /// Appends the points that the rays of the chirp, which has this place among others, light.
+    fn light(&self, chirp: usize, hits: &[Option<Hit>], lit: &mut Vec<Lit<'a>>) {
+        let Paths { setup, footprints, samples, .. } = self.paths;
+        for (sample, hit) in hits.iter().enumerate() {
+            let Some((hit, ray)) = hit.zip(self.spot.ray(samples[sample])) else { continue };
+            lit.push(Lit { chirp, sample, ray, point: self.lit_by_beam(hit, &ray, Passage::FREE) });
+            // Behind every sheet that the ray meets lies something else, or nothing.
+            let (mut front, mut inward) = (hit, Passage::FREE);
+            for behind in &footprints.behind {
+                let Some(sheet) = setup.sheet(front.facet) else { break };
+                let Some(hit) = behind.hits[self.number * hits.len() + sample] else { break };
+                inward = inward.then(passage(setup, sheet, &front, ray.direction));
+                lit.push(Lit { chirp, sample, ray, point: self.lit_by_beam(hit, &ray, inward) });
+                front = hit;
+            }
+        }
+    }
+
+    /// Appends the paths by way of a point, of which the antenna sees this.
+    fn scatter(&self, lit: &Lit, seen: Seen, paths: &mut Vec<Path>) {
+        let Lit { sample, ray, point, .. } = lit;
+        let (sample, hit) = (*sample, point.hit);
         let orientation = self.orientation(sample);
-        let lit = ShadingPoint { inward, ..self.lit_by_beam(hit, ray) };
-        let bare = self.direct(&lit);
+        let bare = self.direct(point, seen);
         let effects = self.paths.effects.as_ref();
         let direct = effects.map_or(bare, |effects| {
             effects.direct(bare, self.number, ray, self.rays, orientation, self.tilts)
@@ -235,18 +315,19 @@ impl<'a> Emission<'a> {
                 effects.map(|effects| effects.instrument_gain(self.number, ray, hit, orientation));
             let flux_w = self.paths.link.flux_w(hit.cos_theta) * self.paths.lit_shares[sample];
             let flux_w = flux_w * gain.unwrap_or(1.0);
-            self.second_order(&lit, flux_w, direct, bounce, sample, paths);
+            self.second_order(point, flux_w, direct, bounce, sample, paths);
         }
     }
 
-    /// A point that a ray of the radar's beam lights.
-    fn lit_by_beam(&self, hit: Hit, ray: &Ray<Global>) -> ShadingPoint<'a> {
+    /// A point that a ray of the radar's beam lights, by the way `inward`.
+    fn lit_by_beam(&self, hit: Hit, ray: &Ray<Global>, inward: Passage) -> ShadingPoint<'a> {
         let to_source = -ray.direction.xyz();
         let (to_antenna, antenna_m) = match self.paths.observer {
             Observer::Radar => (to_source, hit.range_m),
             Observer::Receiver { .. } => self.to_antenna(&hit),
         };
-        self.lit(hit, to_source, to_antenna, antenna_m, hit.range_m)
+        let point = self.lit(hit, to_source, to_antenna, antenna_m, hit.range_m);
+        ShadingPoint { inward, ..point }
     }
 
     /// A point that another point of the target lights from `to_source`; the antenna sees it in the main lobe of its beam, or
@@ -278,10 +359,9 @@ impl<'a> Emission<'a> {
         antenna_m: f64,
         along_beam_m: f64,
     ) -> ShadingPoint<'a> {
-        let ScanGeometry { bvh, region_of_facet, .. } = self.paths.setup.geometry;
-        let region = usize::from(region_of_facet[hit.facet as usize]);
-        let surface = self.paths.setup.surfaces[region];
-        let frame = LocalFrame::at_hit(bvh.mesh(), &hit, to_source, surface.grain);
+        let mesh = self.paths.setup.geometry.bvh.mesh();
+        let surface = self.paths.setup.surfaces[self.paths.region(&hit)];
+        let frame = LocalFrame::at_hit(mesh, &hit, to_source, surface.grain);
         let source = frame.local(to_source);
         let antenna = if to_antenna == to_source { source } else { frame.local(to_antenna) };
         let solid_angle_sr = self.solid_angle_sr(antenna_m, along_beam_m);
@@ -312,15 +392,14 @@ impl<'a> Emission<'a> {
         }
     }
 
-    /// The single path by way of a point.
-    fn direct(&self, lit: &ShadingPoint) -> Path {
+    /// The single path by way of a point, of which the antenna sees this.
+    fn direct(&self, lit: &ShadingPoint, scattered: Seen) -> Path {
         let outward = match self.paths.observer {
             // It is visible to the radar by the same way.
             Observer::Radar => Some(lit.inward.reversed()),
             Observer::Receiver { .. } => self.way_out(lit),
         };
         let ways = [lit.inward, outward.unwrap_or(Passage::FREE)];
-        let scattered = self.scattered(lit);
         let polarised = self.polarised_share(scattered.specular_share, &[lit], &ways);
         let share =
             if outward.is_some() { lit.received_share(scattered) * polarised.share } else { 0.0 };

@@ -113,15 +113,14 @@ pub fn shade(
     let per_task = if setup.bounce.is_some() { 1 } else { (RAYS_PER_TASK / rays).max(1) };
     let tasks = footprints.hits.par_chunks(per_task * rays).enumerate();
     let echoes = tasks.map(|(task, hits)| {
-        let chirps = hits.chunks(rays);
-        let count = chirps.len();
-        let (mut of_chirp, mut seen) = (Vec::new(), Vec::new());
-        let mut found = Vec::with_capacity(count);
-        for (chirp, hits) in (task * per_task..).zip(chirps) {
-            paths.fill(chirp, hits, &mut of_chirp);
-            detector.observe(chirp, &mut of_chirp, &mut seen)?;
-            echoes.append(chirp, hits, &of_chirp, &seen, &mut found);
-        }
+        let (first, count) = (task * per_task, hits.len() / rays);
+        let (mut seen, mut found) = (Vec::new(), Vec::with_capacity(count));
+        paths.for_each_chirp(first, rays, hits, |chirp, of_chirp| {
+            let hits = &hits[(chirp - first) * rays..][..rays];
+            detector.observe(chirp, of_chirp, &mut seen)?;
+            echoes.append(chirp, hits, of_chirp, &seen, &mut found);
+            Ok::<(), RenderError>(())
+        })?;
         done(count);
         Ok(found)
     });

@@ -114,8 +114,6 @@ impl Rays<'_> {
         place: impl Fn(usize, &Ray<Global>, Option<Hit>) -> T + Sync,
         hit_of: impl Fn(&T) -> Option<Hit> + Sync,
     ) -> Result<(Vec<T>, Vec<Option<f64>>), TraceError> {
-        /// Rays that are traced at once: enough to share the walk over the facets, few enough to hold.
-        const RAYS_PER_TURN: usize = 1 << 18;
         let axes = &self.geometry.chirps.rays;
         let hits = self.geometry.closest(axes)?;
         let on_axis = axes.par_iter().zip(hits).enumerate();
@@ -126,40 +124,35 @@ impl Rays<'_> {
             done(axes.len());
             return Ok((on_axis, ranges_m));
         }
-        let turn = (RAYS_PER_TURN / self.samples.len()).max(1);
-        let mut all = Vec::with_capacity(axes.len() * self.samples.len());
-        for (number, some_m) in ranges_m.chunks(turn).enumerate() {
-            all.extend(self.spots(number * turn, some_m, &place)?);
-            done(some_m.len());
-        }
+        let count = self.samples.len();
+        let chirps = (self.geometry.tracer.rays_at_once() / count).max(1);
+        let mut all: Vec<T> =
+            (0..axes.len() * count).into_par_iter().map(|_| T::default()).collect();
+        let tasks = all.par_chunks_mut(chirps * count).zip(ranges_m.par_chunks(chirps)).enumerate();
+        tasks.try_for_each_init(Vec::new, |rays, (task, (all, ranges_m))| {
+            rays.clear();
+            self.spots(task * chirps, ranges_m, rays);
+            // The tracer takes only the rays that exist.
+            let given: Vec<Ray<Global>> = rays.iter().flatten().copied().collect();
+            let mut hits = self.geometry.closest_of_spots(&given, count)?.into_iter();
+            for (number, (ray, placed)) in rays.iter().zip(all).enumerate() {
+                if let Some(ray) = ray {
+                    *placed = place(task * chirps + number / count, ray, hits.next().flatten());
+                }
+            }
+            done(ranges_m.len());
+            Ok::<(), TraceError>(())
+        })?;
         Ok((all, ranges_m))
     }
 
-    /// What `place` gives for all rays of the chirps from `first` on, from the ranges on their axes.
-    fn spots<T: Default + Send>(
-        &self,
-        first: usize,
-        ranges_m: &[Option<f64>],
-        place: impl Fn(usize, &Ray<Global>, Option<Hit>) -> T + Sync,
-    ) -> Result<Vec<T>, TraceError> {
+    /// Appends the rays of the chirps from `first` on, from the ranges on their axes, m.
+    fn spots(&self, first: usize, ranges_m: &[Option<f64>], rays: &mut Vec<Option<Ray<Global>>>) {
         let beam = Beam::new(self.geometry.radar);
-        let count = self.samples.len();
-        let spots = ranges_m.par_iter().enumerate().flat_map_iter(|(offset, &range_m)| {
-            let chirp = first + offset;
-            let axis = &self.geometry.chirps.rays[chirp];
-            let spot = Spot::met(&beam, axis, range_m, chirp);
-            self.samples.iter().map(move |&sample| spot.ray(sample))
-        });
-        let rays: Vec<Option<Ray<Global>>> = spots.collect();
-        // The tracer takes only the rays that exist.
-        let given: Vec<Ray<Global>> = rays.iter().flatten().copied().collect();
-        let mut hits = self.geometry.closest(&given)?.into_iter();
-        let hits: Vec<Option<Hit>> =
-            rays.iter().map(|ray| ray.and_then(|_| hits.next().flatten())).collect();
-        let placed = rays.into_par_iter().zip(hits).enumerate().map(|(number, (ray, hit))| {
-            ray.map_or(T::default(), |ray| place(first + number / count, &ray, hit))
-        });
-        Ok(placed.collect())
+        for (chirp, &range_m) in (first..).zip(ranges_m) {
+            let spot = Spot::met(&beam, &self.geometry.chirps.rays[chirp], range_m, chirp);
+            rays.extend(self.samples.iter().map(|&sample| spot.ray(sample)));
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::sheet::Sheet;
-use crate::brdf::{Scattering, Seen, widening_rad};
+use crate::brdf::{Retro, Scattering, Seen, widening_rad};
 use crate::frames::{Direction, Surface as Local};
 
 /// The surface of the facets of one region.
@@ -55,6 +55,23 @@ impl<'a> Surface<'a> {
         // The beam has its part in the lobe already, and that part is coherent.
         let widening_rad = self.widening_rad(beam_rad);
         Seen { f_per_sr: self.scattering.seen_by(widening_rad, i, o).f_per_sr, ..seen }
+    }
+
+    /// What beams of some divergences, rad, see of it straight back. `retro` is its scattering model.
+    pub(super) fn seen_straight_back(
+        &self,
+        retro: &Retro,
+        looks: impl Iterator<Item = (f64, Direction<Local>)>,
+    ) -> Vec<Seen> {
+        let mut looks: Vec<_> = looks.collect();
+        let mut seen = retro.seen(&looks);
+        if self.seen_lobe_rad.is_some() {
+            looks.iter_mut().for_each(|(beam_rad, _)| *beam_rad = self.widening_rad(*beam_rad));
+            for (seen, f_per_sr) in seen.iter_mut().zip(retro.per_sr(&looks)) {
+                seen.f_per_sr = f_per_sr;
+            }
+        }
+        seen
     }
 
     /// Whether it returns a part of an echo in one wave, to a beam of a divergence, rad.

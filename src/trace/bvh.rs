@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 use rayon::prelude::*;
 
 use super::boxes::Boxes;
+use super::bundle;
 use super::eightfold::Eightfold;
 use super::hit::{Hit, allocate_hits};
 use crate::frames::{Global, Ray};
@@ -56,6 +57,24 @@ impl<'a> Bvh<'a> {
         let mut hits = allocate_hits(rays.len());
         let tasks = rays.par_chunks(RAYS).zip(hits.par_chunks_mut(RAYS));
         tasks.for_each(|(rays, hits)| self.eightfold().closest(self.mesh, rays, hits));
+        hits
+    }
+
+    /// As [`closest_of_each`](Self::closest_of_each), for rays of which so many in a row nearly coincide, as those of a spot do.
+    pub fn closest_of_spots(&self, rays: &[Ray<Global>], rays_per_spot: usize) -> Vec<Option<Hit>> {
+        /// Rays of one task, or more.
+        const RAYS: usize = 256;
+        /// Rays of a spot from which on they are faster together.
+        const LEAST: usize = 4;
+        if rays_per_spot < LEAST {
+            return self.closest_of_each(rays);
+        }
+        let size = rays_per_spot * RAYS.div_ceil(rays_per_spot);
+        let mut hits = allocate_hits(rays.len());
+        let tasks = rays.par_chunks(size).zip(hits.par_chunks_mut(size));
+        tasks.for_each(|(rays, hits)| {
+            bundle::closest(self.eightfold(), self.mesh, rays, rays_per_spot, hits);
+        });
         hits
     }
 

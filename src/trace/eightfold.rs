@@ -13,40 +13,40 @@ use crate::lanes::{Wide, least, most, widest};
 /// Boxes per node, and facets per block.
 const LANES: usize = 8;
 
-type Lanes = [f32; LANES];
+pub(super) type Lanes = [f32; LANES];
 
 /// Bit that distinguishes the number of a block from that of a node.
-const BLOCK: u32 = 1 << 31;
+pub(super) const BLOCK: u32 = 1 << 31;
 
 /// Branches on the stack's array; more spill into a list. The array is small in tests, so that they cover this.
 const STACK: usize = if cfg!(test) { 2 * LANES } else { 64 };
 
 /// The hierarchy. Coordinates count from the centre of its sphere.
 pub(super) struct Eightfold {
-    nodes: Vec<Node>,
-    blocks: Vec<Block>,
-    sphere: Sphere,
+    pub nodes: Vec<Node>,
+    pub blocks: Vec<Block>,
+    pub sphere: Sphere,
 }
 
 /// Eight boxes: their bounds by axis, and the content of each, a node or (with the bit [`BLOCK`]) its first block.
 #[derive(Clone, Copy)]
 #[repr(align(32))]
-struct Node {
-    low: [Lanes; 3],
-    high: [Lanes; 3],
-    content: [u32; LANES],
+pub(super) struct Node {
+    pub low: [Lanes; 3],
+    pub high: [Lanes; 3],
+    pub content: [u32; LANES],
 }
 
 /// Up to eight facets: the coordinates of their corners by corner and axis, and their numbers.
 #[derive(Clone, Copy)]
 #[repr(align(32))]
-struct Block {
-    corners: [[Lanes; 3]; 3],
-    facets: [u32; LANES],
+pub(super) struct Block {
+    pub corners: [[Lanes; 3]; 3],
+    pub facets: [u32; LANES],
     /// A bit per lane that holds a facet.
-    live: u32,
+    pub live: u32,
     /// Whether the next block belongs to the same box.
-    continues: bool,
+    pub continues: bool,
 }
 
 impl Node {
@@ -192,15 +192,27 @@ impl Wide for Walks<'_> {
 
     #[inline(always)]
     fn run(self) {
-        let mut stack = Stack::new();
-        for (ray, hit) in self.rays.iter().zip(self.hits) {
-            let facet = self.eightfold.nearest(self.mesh, ray, &mut stack);
-            *hit = facet.and_then(|facet| plane_hit(self.mesh, facet, ray));
-        }
+        self.eightfold.closest_one_by_one(self.mesh, self.rays, &mut Stack::new(), self.hits);
     }
 }
 
 impl Eightfold {
+    /// As [`closest`](Self::closest), within a computation that is run at the widest. `stack` must be empty, and is empty
+    /// afterwards.
+    #[inline(always)]
+    pub fn closest_one_by_one(
+        &self,
+        mesh: &Mesh,
+        rays: &[Ray<Global>],
+        stack: &mut Stack,
+        hits: &mut [Option<Hit>],
+    ) {
+        for (ray, hit) in rays.iter().zip(hits) {
+            let facet = self.nearest(mesh, ray, stack);
+            *hit = facet.and_then(|facet| plane_hit(mesh, facet, ray));
+        }
+    }
+
     /// Finds the nearest facet of a ray. `stack` must be empty, and is empty afterwards.
     #[inline(always)]
     fn nearest(&self, mesh: &Mesh, ray: &Ray<Global>, stack: &mut Stack) -> Option<u32> {
@@ -347,15 +359,21 @@ impl Aim {
             let right = least(least(ab[1], bc[1]), ca[1]);
             within[lane] = most(left, right);
         }
-        Marks(Marks::of_signs(&within).0 & block.live)
+        Marks::of_signs(&within).and(block.live)
     }
 }
 
 /// A set of lanes, one bit per lane.
 #[derive(Clone, Copy)]
-struct Marks(u32);
+pub(super) struct Marks(u32);
 
 impl Marks {
+    /// Those of the lanes that have a bit here.
+    #[inline(always)]
+    pub fn and(self, lanes: u32) -> Marks {
+        Marks(self.0 & lanes)
+    }
+
     /// The lane, if the set has exactly one.
     #[inline(always)]
     fn single(self) -> Option<usize> {
@@ -364,7 +382,7 @@ impl Marks {
 
     /// The lanes whose sign bit is not set.
     #[inline(always)]
-    fn of_signs(numbers: &Lanes) -> Marks {
+    pub fn of_signs(numbers: &Lanes) -> Marks {
         #[cfg(target_arch = "x86_64")]
         return Marks::of_signs_by_sse(numbers);
         #[cfg(not(target_arch = "x86_64"))]
@@ -406,7 +424,7 @@ impl Iterator for Marks {
 }
 
 /// Branches that a ray has yet to visit, the nearest of each node on top.
-struct Stack {
+pub(super) struct Stack {
     /// In the high half the distance as the bits of an f32, which for positive numbers sort as the numbers do; in
     /// the low half the content.
     top: [u64; STACK],
@@ -417,18 +435,24 @@ struct Stack {
 
 impl Stack {
     #[inline(always)]
-    fn new() -> Stack {
+    pub fn new() -> Stack {
         Stack { top: [0; STACK], len: 0, spilled: Vec::new() }
     }
 
+    /// Number of the entries on the array, from which [`insert_sorted`](Self::insert_sorted) may count.
     #[inline(always)]
-    fn push(&mut self, near: f32, content: u32) {
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    #[inline(always)]
+    pub fn push(&mut self, near: f32, content: u32) {
         self.insert_sorted(self.len, near, content);
     }
 
     /// Makes room for the branches of a node.
     #[inline(always)]
-    fn make_room(&mut self) {
+    pub fn make_room(&mut self) {
         if self.len + LANES > STACK {
             self.spill();
         }
@@ -443,7 +467,7 @@ impl Stack {
 
     /// Pushes a branch so that the entries from `base` on stay sorted, the nearest last.
     #[inline(always)]
-    fn insert_sorted(&mut self, base: usize, near: f32, content: u32) {
+    pub fn insert_sorted(&mut self, base: usize, near: f32, content: u32) {
         let branch = u64::from(near.to_bits()) << 32 | u64::from(content);
         let mut at = self.len.min(STACK - 1);
         while at > base && self.top[at - 1] < branch {
@@ -455,7 +479,7 @@ impl Stack {
     }
 
     #[inline(always)]
-    fn pop(&mut self) -> Option<(f32, u32)> {
+    pub fn pop(&mut self) -> Option<(f32, u32)> {
         let branch = match self.len {
             0 => self.spilled.pop()?,
             _ => {

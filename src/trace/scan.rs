@@ -39,4 +39,16 @@ impl<'a> ScanGeometry<'a> {
     pub fn closest(&self, rays: &[Ray<Global>]) -> Result<Vec<Option<Hit>>, TraceError> {
         self.tracer.closest(self.bvh, rays)
     }
+
+    /// As [`closest`](Self::closest), for rays of which so many in a row are of one spot.
+    ///
+    /// # Errors
+    /// Those of [`closest`](Self::closest).
+    pub fn closest_of_spots(
+        &self,
+        rays: &[Ray<Global>],
+        rays_per_spot: usize,
+    ) -> Result<Vec<Option<Hit>>, TraceError> {
+        self.tracer.closest_of_spots(self.bvh, rays, rays_per_spot)
+    }
 }

@@ -44,6 +44,17 @@ pub enum TraceError {
 }
 
 impl Tracer<'_> {
+    /// Rays without an order that are best given to [`closest`](Self::closest) at once.
+    pub(crate) fn rays_at_once(self) -> usize {
+        match self {
+            // A graphics processor waits for its memory.
+            Tracer::Gpu(_) => 1 << 18,
+            // What a fan does for each of its facets is shared by all rays.
+            Tracer::Pinhole => 1 << 18,
+            Tracer::Automatic | Tracer::Bvh | Tracer::Brute => 1 << 10,
+        }
+    }
+
     /// Finds the closest hit of every ray on the mesh of `bvh`. The hierarchy is built only if the tracer uses it.
     ///
     /// # Errors
@@ -57,6 +68,24 @@ impl Tracer<'_> {
             Tracer::Gpu(_) => return Err(GpuError::OtherMesh.into()),
             Tracer::Automatic => closest(bvh, rays),
         })
+    }
+}
+
+impl Tracer<'_> {
+    /// As [`closest`](Self::closest), for rays of which so many in a row nearly coincide, as those of a spot do.
+    ///
+    /// # Errors
+    /// Those of [`closest`](Self::closest).
+    pub fn closest_of_spots(
+        self,
+        bvh: &Bvh,
+        rays: &[Ray<Global>],
+        rays_per_spot: usize,
+    ) -> Result<Vec<Option<Hit>>, TraceError> {
+        match self {
+            Tracer::Automatic | Tracer::Bvh => Ok(bvh.closest_of_spots(rays, rays_per_spot)),
+            Tracer::Pinhole | Tracer::Brute | Tracer::Gpu(_) => self.closest(bvh, rays),
+        }
     }
 }
 

@@ -173,12 +173,13 @@ impl Model {
         let (law, before) = self.numbers(at);
         let law = at_points(&law, points);
         let f_per_sr: Vec<f64> = law.iter().map(|at| self.f_per_sr(at, &before)).collect();
-        let level_db =
-            |values: &[f64], (at, &f): (&LawAt, &f64)| level_db(term.scatter(values, at, f));
-        let levels = |values: &Vec<f64>| {
-            law.iter().zip(&f_per_sr).map(|pair| level_db(values, pair)).collect()
-        };
-        values.iter().map(levels).collect()
+        values
+            .iter()
+            .map(|values| {
+                let pairs = law.iter().zip(&f_per_sr);
+                pairs.map(|(at, &f)| level_db(term.scatter(values, at, f))).collect()
+            })
+            .collect()
     }
 
     /// A fit to the points for which `used` is true, from a start.
