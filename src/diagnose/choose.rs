@@ -194,11 +194,12 @@ fn add_best<'a>(search: &Search, model: &mut Explanation<'a>, trials: &mut [Tria
         contenders.remove(0);
     }
     let Some(first) = contenders.first() else { return false };
-    // Of those that predict equally well, by the rule of one standard error, the one that is worth most is added.
+    // Of those that predict equally well, by the rule of one standard error, the one that is worth most is added. More than it
+    // gains in the fit no effect is ahead by.
     let mut tied = Vec::new();
     for other in &contenders {
         let [worse, se] = scorer.difference(&first.held_out, &other.held_out);
-        if worse <= (scorer.settings.standard_errors * se).max(SAME)
+        if worse.min(first.gain - other.gain) <= (scorer.settings.standard_errors * se).max(SAME)
             && (other.trial == first.trial || judge.beats_placebos(&mut trials[other.trial]))
         {
             tied.push(other);
