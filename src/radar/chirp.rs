@@ -19,6 +19,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::error::{RadarError, in_range};
+use super::tone::{Signal, Tone};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// One sweep and its sampling.
@@ -154,12 +155,12 @@ impl Chirp {
     /// # Errors
     /// When a return lies outside the unambiguous range, by how much.
     pub fn beat_signal(&self, returns: &[Return]) -> Result<Vec<Complex<f64>>, AliasError> {
-        let mut signal = vec![Complex::ZERO; self.samples];
+        let mut signal = Signal::silence(self.samples);
         for echo in returns {
             self.check_range(echo.range_m)?;
-            self.add_beat(&mut signal, echo);
+            signal.add(self.tone(echo));
         }
-        Ok(signal)
+        Ok(signal.samples(self.samples))
     }
 
     /// Whether a return at a range keeps its place.
@@ -179,22 +180,13 @@ impl Chirp {
         })
     }
 
-    fn add_beat(&self, signal: &mut [Complex<f64>], echo: &Return) {
+    /// The beat of one return.
+    fn tone(&self, echo: &Return) -> Tone {
         let cycles = self.beat_frequency_hz(echo.range_m) * self.duration_s;
-        let step_rad = std::f64::consts::TAU * cycles / self.samples as f64;
         let first_rad = self.phase_rad(echo.range_m) - std::f64::consts::PI * cycles;
-        // Turning a phasor costs one product a sample; its error grows to 1e-12 over 4096. Eight of
-        // them turn side by side, so that none waits for the one before.
-        const LANES: usize = 8;
-        let step = Complex::cis(LANES as f64 * step_rad);
-        let mut phasors: [Complex<f64>; LANES] = std::array::from_fn(|lane| {
-            echo.amplitude_sqrt_w * Complex::cis(first_rad + lane as f64 * step_rad)
-        });
-        for samples in signal.chunks_mut(LANES) {
-            for (sample, phasor) in samples.iter_mut().zip(&mut phasors) {
-                *sample += *phasor;
-                *phasor *= step;
-            }
+        Tone {
+            first: echo.amplitude_sqrt_w * Complex::cis(first_rad),
+            step_rad: std::f64::consts::TAU * cycles / self.samples as f64,
         }
     }
 }

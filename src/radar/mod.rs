@@ -18,6 +18,7 @@ pub mod reference;
 pub mod scan;
 mod settings;
 pub mod speckle;
+mod tone;
 pub mod transmitter;
 pub mod window;
 
