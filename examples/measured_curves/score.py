@@ -183,8 +183,9 @@ def missing(pairs):
           f"Another name: {share(wrong, len(pairs))}.")
     apart = [(t, a) for t, a in all_of_them if t["others_leave"] <= DUE]
     verdicts = collections.Counter("named" if a["effects"] else a["verdict"] for _, a in apart)
-    print(f"Another law is the same curve in the noise, so that no name is due: {len(apart)}; "
-          + (", ".join(f"{name} {count}" for name, count in verdicts.most_common()) or "none"))
+    if apart:
+        print(f"Another law is the same curve in the noise, so that no name is due: {len(apart)}; "
+              + ", ".join(f"{name} {count}" for name, count in verdicts.most_common()))
     return silent <= SILENT * len(pairs)
 
 
@@ -228,9 +229,10 @@ def main():
     # Curves without a name that is due come last.
     truths.sort(key=lambda t: (t["id"][0] != "A", t.get("others_leave", DUE + 1) <= DUE))
     asked = [t for t in truths if t.get("reached", True)]
-    pairs = answers(a.matdb, a.folder, asked, a.jobs, recorded(a.record, a.about), time.time() + 60 * a.minutes)
+    earlier = recorded(a.record, a.about)
+    pairs = answers(a.matdb, a.folder, asked, a.jobs, earlier, time.time() + 60 * a.minutes)
     if a.record:
-        record(a.record, a.about, {t["id"]: b for t, b in pairs})
+        record(a.record, a.about, {**earlier, **{t["id"]: b for t, b in pairs}})
     if len(pairs) < len(asked):
         print(f"Not all done: {share(len(pairs), len(asked))}.")
     met = bool(a.parts)

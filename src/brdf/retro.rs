@@ -161,7 +161,7 @@ mod tests {
     #[test]
     fn the_parts_are_those_of_the_law() {
         let mut compared = 0;
-        for model in every_model() {
+        for model in every_model().into_iter().filter(|model| model.backscatter().is_some()) {
             for (found, (beam_rad, v)) in Retro::new(&model).seen(&looks()).iter().zip(looks()) {
                 let expected = model.seen_by(beam_rad, v, v);
                 let near = (found.f_per_sr - expected.f_per_sr).abs() <= 1e-9 * expected.f_per_sr;
@@ -228,8 +228,12 @@ mod tests {
         for model in every_model() {
             let retro = Retro::new(&model);
             let bits = |width| {
-                let f_per_sr = at_most(width, || retro.per_sr(&looks()));
-                f_per_sr.into_iter().map(f64::to_bits).collect::<Vec<u64>>()
+                let (f_per_sr, seen) =
+                    at_most(width, || (retro.per_sr(&looks()), retro.seen(&looks())));
+                let parts = seen
+                    .iter()
+                    .flat_map(|seen| [seen.f_per_sr, seen.specular_share, seen.coherent_share]);
+                f_per_sr.into_iter().chain(parts).map(f64::to_bits).collect::<Vec<u64>>()
             };
             let [plain, of_256, of_512] = [128, 256, 512].map(bits);
             assert!(plain == of_256 && plain == of_512, "{model:?}");

@@ -13,14 +13,14 @@ use nalgebra::DVector;
 use super::clouds;
 use super::error::DiagnoseError;
 use super::evidence::{Candidate, CloudGain, Evidence, Largest};
-use super::exchange::{SAME, exchange};
+use super::exchange::exchange;
 use super::explanation::{Addition, Explanation};
 use super::field::Structure;
 use super::refit::{Fit, SCOUT};
 use super::scorer::{HeldOut, State};
 use super::settings::gain_of_starts;
 use super::space::Space;
-use super::support::Judge;
+use super::support::{Judge, is_as_good};
 use super::trial::{Search, Trial};
 use crate::effects::Effect;
 
@@ -249,12 +249,6 @@ fn add_best<'a>(search: &Search, model: &mut Explanation<'a>, trials: &mut [Tria
     true
 }
 
-/// Whether an effect does as well as the best, from how much less held-out patches gain by it, with the standard error, and
-/// how much less counts. Held-out patches may gain more than the fit itself, by chance.
-fn is_as_good([worse, se]: [f64; 2], less: f64, standard_errors: f64) -> bool {
-    worse.min(less) <= (standard_errors * se).max(SAME)
-}
-
 /// The trials that the data support, the one with the largest gain first.
 fn contenders(judge: &Judge, trials: &mut [Trial]) -> Vec<Contender> {
     let mut contenders = Vec::new();
@@ -356,18 +350,4 @@ fn are_both_needed(search: &Search, both: &State, pair: [&Trial; 2]) -> bool {
         let [gain, se] = scorer.difference(&both.held_out, &alone);
         gain > scorer.settings.standard_errors * se
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_effect_is_no_farther_ahead_than_what_it_gains_in_the_fit() {
-        // Gains of two effects in held-out patches and in the fit: 30.1 and 26.1, 15.8 and 24.8. Of the 14.3, 10.3 count.
-        assert!(is_as_good([14.3, 8.0], 10.3, 1.5));
-        assert!(!is_as_good([14.3, 8.0], 14.3, 1.5));
-        assert!(is_as_good([11.9, 8.0], 20.0, 1.5));
-        assert!(is_as_good([2.9, 0.0], 9.0, 1.5), "a few in ln p are nothing");
-    }
 }

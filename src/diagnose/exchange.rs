@@ -4,14 +4,11 @@
 use super::clouds;
 use super::evidence::{Evidence, Largest};
 use super::explanation::{Addition, Explanation};
-use super::scorer::State;
+use super::scorer::{Scorer, State};
 use super::settings::gain_of_starts;
-use super::support::Judge;
+use super::support::{Judge, is_as_good};
 use super::trial::{Search, Trial};
 use crate::effects::Effect;
-
-/// Difference in ln p of all held-out shots below which two effects predict equally well: odds of twenty to one.
-pub(super) const SAME: f64 = 3.0;
 
 /// Compares each of several effects with its rivals, and replaces it by a better one.
 pub(super) fn exchange<'a>(search: &Search, model: &mut Explanation<'a>) {
@@ -60,7 +57,10 @@ fn contest<'a>(
     }
     // Of effects that predict equally well the one that is worth more is better.
     let [better, se] = scorer.difference(&with_rival.held_out, &state.held_out);
-    let is_tied = better.abs() <= (scorer.settings.standard_errors * se).max(SAME);
+    let ahead = counted(scorer, &with_rival, without) - counted(scorer, state, without);
+    let errors = scorer.settings.standard_errors;
+    let is_tied =
+        is_as_good([better, se], ahead, errors) && is_as_good([-better, se], -ahead, errors);
     let by_starts = gain_of_starts(tried);
     let [own, other] = [state.worth() - last.by_starts, with_rival.worth() - by_starts];
     let is_better = if is_tied { other > own } else { better > 0.0 };
@@ -82,4 +82,10 @@ fn contest<'a>(
     } else if is_better {
         last.class.clear();
     }
+}
+
+/// The gain of a model over another that counts: that of the fit bounds that of held-out shots.
+fn counted(scorer: &Scorer, state: &State, without: &State) -> f64 {
+    let [held_out, _] = scorer.difference(&state.held_out, &without.held_out);
+    held_out.min(state.fit.ln_likelihood - without.fit.ln_likelihood)
 }

@@ -20,7 +20,7 @@ pub(super) struct Signal {
 }
 
 impl Signal {
-    /// Silence of so many samples.
+    /// Silence of this number of samples.
     pub fn silence(samples: usize) -> Signal {
         Signal { blocks: vec![[[0.0; LANES]; 2]; samples.div_ceil(LANES)] }
     }
@@ -39,7 +39,7 @@ impl Signal {
         widest(Turning { blocks: &mut self.blocks, phasors, step });
     }
 
-    /// The first so many samples.
+    /// The first samples of this number.
     pub fn samples(&self, count: usize) -> Vec<Complex<f64>> {
         let blocks = self.blocks.iter();
         let samples = blocks.flat_map(|[re, im]| re.iter().zip(im));

@@ -1,6 +1,6 @@
 //! The surfaces along the axis of every chirp, sheets and what lies behind, as a receiver parts their echoes.
 
-use rayon::prelude::*;
+use std::convert::Infallible;
 
 use super::observer::Observer;
 use super::path::Path;
@@ -29,9 +29,8 @@ pub(crate) struct Layer {
 pub(crate) fn layers(setup: &Setup, footprints: &Footprints) -> Vec<Vec<Vec<Layer>>> {
     let paths = Paths::new(setup, Observer::Radar, footprints, None);
     let cell_m = setup.geometry.radar.range_cell_m();
-    let of_chirps = footprints.chirps().enumerate().map(|(chirp, hits)| {
-        let mut of_chirp = paths.of_chirp(chirp, hits);
-        let echoes = separate(&mut of_chirp, cell_m);
+    let Ok(of_chirps) = paths.of_all::<_, Infallible>(&|_| {}, |chirp, _, of_chirp, layers| {
+        let echoes = separate(of_chirp, cell_m);
         let layer = |path: &Path| Layer {
             hit: path.hit,
             sheets: path.sheets,
@@ -39,7 +38,9 @@ pub(crate) fn layers(setup: &Setup, footprints: &Footprints) -> Vec<Vec<Vec<Laye
             power_w: path.power_w,
             edge_m: footprints.edge_m_behind(path.sheets)[chirp],
         };
-        echoes.into_iter().map(|of| of_chirp[of].iter().map(layer).collect()).collect()
+        layers
+            .push(echoes.into_iter().map(|of| of_chirp[of].iter().map(layer).collect()).collect());
+        Ok(())
     });
-    of_chirps.collect()
+    of_chirps
 }

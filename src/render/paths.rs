@@ -83,14 +83,14 @@ struct ShadingPoint<'a> {
     inward: Passage,
 }
 
-/// A point of the target in a ray of a chirp.
-struct Lit<'a> {
+/// A point that a ray of a chirp illuminates.
+struct RayPoint<'a> {
     /// Place of the chirp among those that are computed at once.
     chirp: usize,
     /// Number of the ray in its spot.
     sample: usize,
     ray: Ray<Global>,
-    point: ShadingPoint<'a>,
+    lit: ShadingPoint<'a>,
 }
 
 /// What a channel of the antenna receives of the power on a path.
@@ -178,73 +178,107 @@ impl<'a> Paths<'a> {
     /// The change of every whole echo by the effects. It depends on all echoes of the scan, so that all paths are
     /// computed once more before.
     fn changes_by(&self, effects: &EffectScan) -> Vec<Option<Change>> {
-        let chirps = self.footprints.chirps().enumerate();
-        let sums = chirps.map(|(chirp, hits)| {
-            let paths = self.of_chirp(chirp, hits);
-            let Detection { power_w, range_m } = sum(&paths);
-            (!paths.is_empty()).then_some(MeanEcho::at_once(power_w, range_m))
+        let Ok(sums) = self.of_all::<_, Infallible>(&|_| {}, |_, _, paths, sums| {
+            let Detection { power_w, range_m } = sum(paths);
+            sums.push((!paths.is_empty()).then_some(MeanEcho::at_once(power_w, range_m)));
+            Ok(())
         });
-        effects.changes(self.footprints, sums.collect())
+        effects.changes(self.footprints, sums)
+    }
+
+    /// What `each` appends to a list for every chirp, from its number, its hits and its paths, in the order of the chirps, on
+    /// all threads. `done` is called repeatedly with the number of chirps that were finished since the last call.
+    ///
+    /// # Errors
+    /// An error of `each`.
+    pub fn of_all<T: Send, E: Send>(
+        &self,
+        done: &(dyn Fn(usize) + Sync),
+        each: impl Fn(usize, &[Option<Hit>], &mut Vec<Path>, &mut Vec<T>) -> Result<(), E> + Sync,
+    ) -> Result<Vec<T>, E> {
+        /// Rays of a task. With second-order paths every chirp is a task.
+        const RAYS: usize = 256;
+        let rays = self.rays_per_chirp();
+        let chirps = if self.setup.bounce.is_some() { 1 } else { (RAYS / rays).max(1) };
+        let tasks = self.footprints.hits.par_chunks(chirps * rays).enumerate();
+        let found = tasks.map(|(task, hits)| {
+            let mut found = Vec::with_capacity(hits.len() / rays);
+            self.of_some(task * chirps, hits, |chirp, hits, paths| {
+                each(chirp, hits, paths, &mut found)
+            })?;
+            done(hits.len() / rays);
+            Ok(found)
+        });
+        let mut all = Vec::new();
+        for mut found in found.collect::<Result<Vec<Vec<T>>, E>>()? {
+            all.append(&mut found);
+        }
+        Ok(all)
     }
 
     /// All paths of a chirp through the hits of its rays, including single paths without power.
     pub fn of_chirp(&self, number: usize, hits: &[Option<Hit>]) -> Vec<Path> {
         let mut of_chirp = Vec::new();
-        let Ok(()) = self.for_each_chirp::<Infallible>(number, hits.len(), hits, |_, paths| {
+        let Ok(()) = self.of_some::<Infallible>(number, hits, |_, _, paths| {
             of_chirp.append(paths);
             Ok(())
         });
         of_chirp
     }
 
-    /// Calls `each` with the number of each chirp from `first` on and all its paths. The laws of all these chirps are
-    /// evaluated at once. The first error ends it.
-    pub fn for_each_chirp<E>(
+    /// Calls `each` with number, hits and paths of each chirp from `first` on. Their laws are evaluated at once.
+    fn of_some<E>(
         &self,
         first: usize,
-        rays: usize,
         hits: &[Option<Hit>],
-        mut each: impl FnMut(usize, &mut Vec<Path>) -> Result<(), E>,
+        mut each: impl FnMut(usize, &[Option<Hit>], &mut Vec<Path>) -> Result<(), E>,
     ) -> Result<(), E> {
-        let chirps = (first..).zip(hits.chunks(rays));
-        let sent: Vec<Emission> = chirps.map(|(number, hits)| self.sent(number, hits)).collect();
-        let mut lit = Vec::with_capacity(hits.len());
-        for (chirp, (emission, hits)) in sent.iter().zip(hits.chunks(rays)).enumerate() {
-            emission.light(chirp, hits, &mut lit);
+        let chirps = hits.chunks(self.rays_per_chirp());
+        let emissions: Vec<Emission> = (first..)
+            .zip(chirps.clone())
+            .map(|(number, hits)| self.emission(number, hits))
+            .collect();
+        let mut points = Vec::with_capacity(hits.len());
+        for (chirp, (emission, hits)) in emissions.iter().zip(chirps.clone()).enumerate() {
+            emission.push_points(chirp, hits, &mut points);
         }
-        let seen = self.seen(&sent, &lit);
-        let mut lit = lit.into_iter().zip(seen).peekable();
+        let seen = self.seen(&emissions, &points);
+        let mut points = points.into_iter().zip(seen).peekable();
         let (mut paths, mut direct) = (Vec::new(), Vec::new());
-        for (chirp, emission) in sent.iter().enumerate() {
+        for (chirp, (emission, hits)) in emissions.iter().zip(chirps).enumerate() {
             paths.clear();
             direct.clear();
-            while let Some((lit, seen)) = lit.next_if(|(lit, _)| lit.chirp == chirp) {
-                direct.push(RayPath { ray: lit.sample, place: paths.len() });
-                emission.scatter(&lit, seen, &mut paths);
+            while let Some((point, seen)) = points.next_if(|(point, _)| point.chirp == chirp) {
+                direct.push(RayPath { ray: point.sample, place: paths.len() });
+                emission.scatter(&point, seen, &mut paths);
             }
             self.finish(emission.number, &direct, &mut paths);
-            each(emission.number, &mut paths)?;
+            each(emission.number, hits, &mut paths)?;
         }
         Ok(())
     }
 
-    /// What each point that is lit scatters towards the antenna.
-    fn seen(&self, sent: &[Emission], lit: &[Lit]) -> Vec<Seen> {
-        if self.retros.is_empty() {
-            return lit.iter().map(|lit| sent[lit.chirp].scattered(&lit.point)).collect();
+    fn rays_per_chirp(&self) -> usize {
+        self.footprints.rays_per_chirp.max(1)
+    }
+
+    /// What each point scatters towards the antenna.
+    fn seen(&self, emissions: &[Emission], points: &[RayPoint]) -> Vec<Seen> {
+        if let Observer::Receiver { .. } = self.observer {
+            let towards = |point: &RayPoint| emissions[point.chirp].scattered(&point.lit);
+            return points.iter().map(towards).collect();
         }
-        let regions: Vec<usize> = lit.iter().map(|lit| self.region(&lit.point.hit)).collect();
-        let mut by_region: Vec<usize> = (0..lit.len()).collect();
+        let regions: Vec<usize> = points.iter().map(|point| self.region(&point.lit.hit)).collect();
+        let mut by_region: Vec<usize> = (0..points.len()).collect();
         by_region.sort_by_key(|&place| regions[place]);
-        let mut seen = vec![Seen::default(); lit.len()];
+        let mut seen = vec![Seen::default(); points.len()];
         for here in by_region.chunk_by(|&a, &b| regions[a] == regions[b]) {
-            let number = regions[here[0]];
-            let (retro, surface) = (&self.retros[number], &self.setup.surfaces[number]);
-            let look = |&place: &usize| (lit[place].point.beam_rad, lit[place].point.source);
-            for (place, of_look) in
-                here.iter().zip(surface.seen_straight_back(retro, here.iter().map(look)))
-            {
-                seen[*place] = of_look;
+            let region = regions[here[0]];
+            let (retro, surface) = (&self.retros[region], &self.setup.surfaces[region]);
+            let lit = here.iter().map(|&place| &points[place].lit);
+            let looks = lit.map(|lit| (lit.beam_rad, lit.source));
+            for (&place, of_look) in here.iter().zip(surface.seen_straight_back(retro, looks)) {
+                seen[place] = of_look;
             }
         }
         seen
@@ -256,7 +290,7 @@ impl<'a> Paths<'a> {
     }
 
     /// What is common to the rays of a chirp.
-    fn sent(&self, number: usize, hits: &[Option<Hit>]) -> Emission<'_> {
+    fn emission(&self, number: usize, hits: &[Option<Hit>]) -> Emission<'_> {
         let axis = &self.setup.geometry.chirps.rays[number];
         let antenna = self.observer.position(axis.origin.xyz);
         let range_m = self.footprints.axis_range_m[number];
@@ -281,41 +315,42 @@ impl<'a> Paths<'a> {
 }
 
 impl<'a> Emission<'a> {
-    /// Appends the points that the rays of the chirp, which has this place among others, light.
-    fn light(&self, chirp: usize, hits: &[Option<Hit>], lit: &mut Vec<Lit<'a>>) {
+    /// Appends the points that the rays of the chirp illuminate; `chirp` is its place among those that are computed at once.
+    fn push_points(&self, chirp: usize, hits: &[Option<Hit>], points: &mut Vec<RayPoint<'a>>) {
         let Paths { setup, footprints, samples, .. } = self.paths;
         for (sample, hit) in hits.iter().enumerate() {
             let Some((hit, ray)) = hit.zip(self.spot.ray(samples[sample])) else { continue };
-            lit.push(Lit { chirp, sample, ray, point: self.lit_by_beam(hit, &ray, Passage::FREE) });
+            let lit = self.lit_by_beam(hit, &ray, Passage::FREE);
+            points.push(RayPoint { chirp, sample, ray, lit });
             // Behind every sheet that the ray meets lies something else, or nothing.
             let (mut front, mut inward) = (hit, Passage::FREE);
             for behind in &footprints.behind {
                 let Some(sheet) = setup.sheet(front.facet) else { break };
                 let Some(hit) = behind.hits[self.number * hits.len() + sample] else { break };
                 inward = inward.then(passage(setup, sheet, &front, ray.direction));
-                lit.push(Lit { chirp, sample, ray, point: self.lit_by_beam(hit, &ray, inward) });
+                let lit = self.lit_by_beam(hit, &ray, inward);
+                points.push(RayPoint { chirp, sample, ray, lit });
                 front = hit;
             }
         }
     }
 
     /// Appends the paths by way of a point, of which the antenna sees this.
-    fn scatter(&self, lit: &Lit, seen: Seen, paths: &mut Vec<Path>) {
-        let Lit { sample, ray, point, .. } = lit;
-        let (sample, hit) = (*sample, point.hit);
+    fn scatter(&self, point: &RayPoint, seen: Seen, paths: &mut Vec<Path>) {
+        let RayPoint { sample, ref ray, ref lit, .. } = *point;
         let orientation = self.orientation(sample);
-        let bare = self.direct(point, seen);
+        let bare = self.direct(lit, seen);
         let effects = self.paths.effects.as_ref();
         let direct = effects.map_or(bare, |effects| {
             effects.direct(bare, self.number, ray, self.rays, orientation, self.tilts)
         });
         paths.push(direct);
         if let Some(bounce) = &self.paths.setup.bounce {
-            let gain =
-                effects.map(|effects| effects.instrument_gain(self.number, ray, hit, orientation));
-            let flux_w = self.paths.link.flux_w(hit.cos_theta) * self.paths.lit_shares[sample];
+            let gain = effects
+                .map(|effects| effects.instrument_gain(self.number, ray, lit.hit, orientation));
+            let flux_w = self.paths.link.flux_w(lit.hit.cos_theta) * self.paths.lit_shares[sample];
             let flux_w = flux_w * gain.unwrap_or(1.0);
-            self.second_order(point, flux_w, direct, bounce, sample, paths);
+            self.second_order(lit, flux_w, direct, bounce, sample, paths);
         }
     }
 

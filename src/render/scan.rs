@@ -86,9 +86,6 @@ fn check_hits(footprints: Footprints, geometry: &ScanGeometry) -> Result<Footpri
     Ok(footprints)
 }
 
-/// Rays per task of shading. With second-order paths every chirp is a task.
-const RAYS_PER_TASK: usize = 256;
-
 /// Computes the echoes at an antenna from the hits of [`trace`], or of [`trace_placed`] for a setup with effects or sheets. `done`
 /// is called repeatedly with the number of chirps that were finished since the last call.
 ///
@@ -109,26 +106,16 @@ pub fn shade(
     let paths = Paths::new(setup, observer, footprints, effects);
     let target_from_global = setup.geometry.radar.frames().global_from_target.inverse();
     let echoes = Echoes { setup, footprints, observer, detector: &detector, target_from_global };
-    let rays = footprints.rays_per_chirp.max(1);
-    let per_task = if setup.bounce.is_some() { 1 } else { (RAYS_PER_TASK / rays).max(1) };
-    let tasks = footprints.hits.par_chunks(per_task * rays).enumerate();
-    let echoes = tasks.map(|(task, hits)| {
-        let (first, count) = (task * per_task, hits.len() / rays);
-        let (mut seen, mut found) = (Vec::new(), Vec::with_capacity(count));
-        paths.for_each_chirp(first, rays, hits, |chirp, of_chirp| {
-            let hits = &hits[(chirp - first) * rays..][..rays];
-            detector.observe(chirp, of_chirp, &mut seen)?;
-            echoes.append(chirp, hits, of_chirp, &seen, &mut found);
-            Ok::<(), RenderError>(())
-        })?;
-        done(count);
-        Ok(found)
-    });
-    let echoes: Vec<Vec<Echo>> = echoes.collect::<Result<_, RenderError>>()?;
+    let echoes = paths.of_all(done, |chirp, hits, of_chirp, found| {
+        let mut seen = Vec::new();
+        detector.observe(chirp, of_chirp, &mut seen)?;
+        echoes.append(chirp, hits, of_chirp, &seen, found);
+        Ok::<(), RenderError>(())
+    })?;
     Ok(Scan {
         chirps: setup.geometry.chirps.rays.len(),
         hits: footprints.chirps().filter(|hits| hits.iter().any(Option::is_some)).count(),
-        echoes: echoes.concat(),
+        echoes,
         threshold_w: detector.threshold_w(),
         noise_w: detector.noise_w(),
     })
@@ -285,14 +272,35 @@ mod tests {
 
     /// The scan of a mesh with many rays per chirp.
     fn shaded(mesh: &Mesh, rays: usize, surface: &dyn Scattering) -> Scan {
+        shaded_regions(mesh, rays, &vec![0; mesh.facets.len()], &[Surface::new(surface)])
+    }
+
+    /// The same of a mesh of several regions.
+    fn shaded_regions(mesh: &Mesh, rays: usize, regions: &[u16], surfaces: &[Surface]) -> Scan {
         let radar = Radar::default();
         let chirps = chirps(&radar);
-        let (bvh, regions) = (Bvh::new(mesh), vec![0; mesh.facets.len()]);
-        let geometry = ScanGeometry::new(&radar, &chirps, &bvh, &regions);
+        let bvh = Bvh::new(mesh);
+        let geometry = ScanGeometry::new(&radar, &chirps, &bvh, regions);
         let footprints = trace(&geometry, rays, &|_| {}).unwrap();
-        let surfaces = [Surface::new(surface)];
-        let setup = Setup::new(geometry, &surfaces);
+        let setup = Setup::new(geometry, surfaces);
         shade(&setup, &footprints, Observer::Radar, &|_| {}).unwrap()
+    }
+
+    #[test]
+    fn facets_of_regions_in_turn_have_each_the_law_of_its_own() {
+        let mut mesh = solids::icosphere(0.3, 3);
+        mesh.vertices.iter_mut().for_each(|vertex| vertex.y += 1.1);
+        let (dull, own) = (Lambert { albedo: 0.5 }, |i: Direction<_>, _| 0.3 * i.cos_theta());
+        let regions: Vec<u16> = (0..mesh.facets.len()).map(|facet| facet as u16 % 2).collect();
+        let surfaces = [Surface::new(&dull), Surface::new(&own)];
+        let both = shaded_regions(&mesh, 1, &regions, &surfaces).echoes;
+        let alone = [&dull as &dyn Scattering, &own].map(|law| shaded(&mesh, 1, law).echoes);
+        assert!(both.len() > 500);
+        for (place, echo) in both.iter().enumerate() {
+            let region = usize::from(echo.truth.unwrap().region);
+            assert_eq!(region, echo.truth.unwrap().hit.facet as usize % 2);
+            assert_eq!(echo.power_w, alone[region][place].power_w);
+        }
     }
 
     #[test]

@@ -16,7 +16,7 @@ use super::surface::Orientation;
 use crate::frames::{Global, Ray};
 use crate::radar::scan::PATTERN_RANGE_M;
 use crate::radar::{Beam, GaussianBeam, Radar, Section};
-use crate::trace::{Hit, ScanGeometry, TraceError};
+use crate::trace::{Hit, ScanGeometry, TraceError, Tracer};
 
 /// 1/φ: successive multiples of it are spread evenly over 0 to 1.
 pub(super) const GOLDEN: f64 = 0.618_033_988_749_894_9;
@@ -97,6 +97,9 @@ pub(super) fn trace_moved(
     Ok(Footprints { rays_per_chirp, hits, axis_range_m, edge_m, orientations, behind, ended: 0 })
 }
 
+/// Chirps whose spots are laid out together.
+const CHIRPS_PER_TASK: usize = 64;
+
 /// The rays of a scan.
 struct Rays<'a> {
     geometry: ScanGeometry<'a>,
@@ -128,31 +131,57 @@ impl Rays<'_> {
         let chirps = (self.geometry.tracer.rays_at_once() / count).max(1);
         let mut all: Vec<T> =
             (0..axes.len() * count).into_par_iter().map(|_| T::default()).collect();
-        let tasks = all.par_chunks_mut(chirps * count).zip(ranges_m.par_chunks(chirps)).enumerate();
-        tasks.try_for_each_init(Vec::new, |rays, (task, (all, ranges_m))| {
-            rays.clear();
-            self.spots(task * chirps, ranges_m, rays);
-            // The tracer takes only the rays that exist.
-            let given: Vec<Ray<Global>> = rays.iter().flatten().copied().collect();
-            let mut hits = self.geometry.closest_of_spots(&given, count)?.into_iter();
-            for (number, (ray, placed)) in rays.iter().zip(all).enumerate() {
-                if let Some(ray) = ray {
-                    *placed = place(task * chirps + number / count, ray, hits.next().flatten());
-                }
-            }
+        let tasks = all.chunks_mut(chirps * count).zip(ranges_m.chunks(chirps)).enumerate();
+        let tasks: Vec<_> = tasks.collect();
+        let run = |(task, (all, ranges_m)): (usize, (&mut [T], &[Option<f64>]))| {
+            self.spots(task * chirps, ranges_m, all, &place)?;
             done(ranges_m.len());
             Ok::<(), TraceError>(())
-        })?;
+        };
+        // A graphics processor takes one list after the other.
+        match self.geometry.tracer {
+            Tracer::Gpu(_) => tasks.into_iter().try_for_each(run)?,
+            _ => tasks.into_par_iter().try_for_each(run)?,
+        }
         Ok((all, ranges_m))
     }
 
-    /// Appends the rays of the chirps from `first` on, from the ranges on their axes, m.
-    fn spots(&self, first: usize, ranges_m: &[Option<f64>], rays: &mut Vec<Option<Ray<Global>>>) {
-        let beam = Beam::new(self.geometry.radar);
-        for (chirp, &range_m) in (first..).zip(ranges_m) {
-            let spot = Spot::met(&beam, &self.geometry.chirps.rays[chirp], range_m, chirp);
-            rays.extend(self.samples.iter().map(|&sample| spot.ray(sample)));
-        }
+    /// Puts in `all` what `place` gives for all rays of the chirps from `first` on, from the ranges on their axes, m.
+    fn spots<T: Send>(
+        &self,
+        first: usize,
+        ranges_m: &[Option<f64>],
+        all: &mut [T],
+        place: &(impl Fn(usize, &Ray<Global>, Option<Hit>) -> T + Sync),
+    ) -> Result<(), TraceError> {
+        let (beam, count) = (Beam::new(self.geometry.radar), self.samples.len());
+        let chirps = (first..first + ranges_m.len()).into_par_iter().zip(ranges_m);
+        let spots = chirps.with_min_len(CHIRPS_PER_TASK).map(|(chirp, &range_m)| {
+            Spot::met(&beam, &self.geometry.chirps.rays[chirp], range_m, chirp)
+        });
+        let spots: Vec<Spot> = spots.collect();
+        let mut rays = vec![None; all.len()];
+        let of_spots = rays.par_chunks_mut(count).with_min_len(CHIRPS_PER_TASK).zip(&spots);
+        of_spots.for_each(|(rays, spot)| {
+            rays.iter_mut().zip(&self.samples).for_each(|(ray, &at)| *ray = spot.ray(at));
+        });
+        // The tracer takes only the rays that exist.
+        let given: Vec<Ray<Global>> = rays.iter().flatten().copied().collect();
+        let mut hits = self.geometry.closest_of_spots(&given, count)?.into_iter();
+        let hits: Vec<Option<Hit>> =
+            rays.iter().map(|ray| ray.and_then(|_| hits.next().flatten())).collect();
+        let placed =
+            all.par_chunks_mut(count).zip(rays.par_chunks(count).zip(hits.par_chunks(count)));
+        placed.enumerate().with_min_len(CHIRPS_PER_TASK).for_each(
+            |(chirp, (all, (rays, hits)))| {
+                for (placed, (ray, &hit)) in all.iter_mut().zip(rays.iter().zip(hits)) {
+                    if let Some(ray) = ray {
+                        *placed = place(first + chirp, ray, hit);
+                    }
+                }
+            },
+        );
+        Ok(())
     }
 }
 

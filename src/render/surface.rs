@@ -89,3 +89,42 @@ pub struct Orientation {
     /// Azimuth of the radar about it, from the grain of the region, rad.
     pub azimuth_rad: f64,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf::{CookTorrance, Distribution, Shadowing};
+
+    #[test]
+    fn straight_back_many_looks_see_what_each_sees() {
+        let rough = CookTorrance {
+            f_lambda: 0.3,
+            m: 0.05,
+            m_across: None,
+            distribution: Distribution::Ggx,
+            shadowing: Shadowing::Separable,
+        };
+        let own = |i: Direction<Local>, _| 0.1 * i.cos_theta();
+        let seen_before = Surface { seen_lobe_rad: Some(0.05), ..Surface::new(&rough) };
+        for surface in [Surface::new(&rough), seen_before, Surface::new(&own)] {
+            let looks = (0..40).map(|k| {
+                let k = f64::from(k);
+                (0.001 * k, Direction::from_angles(0.04 * k, 0.3 * k))
+            });
+            let seen = surface.seen_straight_back(&Retro::new(surface.scattering), looks.clone());
+            assert_eq!(seen.len(), 40);
+            for (found, (beam_rad, v)) in seen.into_iter().zip(looks) {
+                let expected = surface.seen_by(beam_rad, v, v);
+                let apart = [
+                    found.f_per_sr / expected.f_per_sr - 1.0,
+                    found.specular_share - expected.specular_share,
+                    found.coherent_share - expected.coherent_share,
+                ];
+                assert!(
+                    apart.iter().all(|x| x.abs() < 1e-9),
+                    "{beam_rad} {v:?}: {found:?} {expected:?}"
+                );
+            }
+        }
+    }
+}

@@ -5,7 +5,7 @@
 //! hits are the same bits.
 
 use super::boxes::{PADDING, Sphere};
-use super::eightfold::{BLOCK, Block, Eightfold, Lanes as Boxes, Marks, Node, Stack};
+use super::eightfold::{BLOCK, Block, Eightfold, Lanes as Eight, Marks, Node, Stack};
 use super::facet::{Line, plane_hit};
 use super::hit::Hit;
 use crate::frames::{Global, Ray};
@@ -17,13 +17,14 @@ const LANES: usize = 16;
 
 type Lanes = [f32; LANES];
 
-/// Rays of one bundle: more do not share more.
+/// Rays of one bundle: fewer are faster one by one, and more do not share more.
+const FEWEST: usize = 4;
 const MOST: usize = 128;
 
 /// Largest ratio of a ray's components across the bundle to that along it: the rays point to one side of the mesh.
 const STEEPEST: f64 = 2.0;
 
-/// A sixteenth of a bundle: where each ray crosses the base plane, and by how much it moves per depth.
+/// Sixteen rays of a bundle: where each crosses the base plane, and by how much it moves per depth.
 #[derive(Clone, Copy)]
 struct Sixteen {
     at: [Lanes; 2],
@@ -47,32 +48,31 @@ struct Bundle<'a> {
     margin_m: f32,
 }
 
-/// What the rays of a bundle have met so far.
-struct Met {
-    /// Range, m, and number of the nearest facet of each ray.
-    nearest: Vec<Option<(f64, u32)>>,
+/// The nearest facets of the rays of a bundle so far.
+struct Nearest {
+    /// Range, m, and number of that of each ray.
+    facets: Vec<Option<(f64, u32)>>,
     /// Depth behind the base plane beyond which no facet is nearer to any ray, m.
     limit: f32,
 }
 
-/// Finds the closest hit of each ray; those of a chunk of `together` should nearly coincide.
+/// Finds the closest hit of each ray of some spots, one spot after the other.
 pub(super) fn closest(
     eightfold: &Eightfold,
     mesh: &Mesh,
     rays: &[Ray<Global>],
-    together: usize,
+    rays_per_spot: usize,
     hits: &mut [Option<Hit>],
 ) {
-    let size = together.clamp(1, MOST);
-    widest(Walks { eightfold, mesh, rays, size, hits });
+    widest(Walks { eightfold, mesh, rays, rays_per_spot: rays_per_spot.max(1), hits });
 }
 
-/// Bundles to be traced, and their hits.
+/// Spots to be traced, and the hits of their rays.
 struct Walks<'a> {
     eightfold: &'a Eightfold,
     mesh: &'a Mesh,
     rays: &'a [Ray<Global>],
-    size: usize,
+    rays_per_spot: usize,
     hits: &'a mut [Option<Hit>],
 }
 
@@ -81,14 +81,18 @@ impl Wide for Walks<'_> {
 
     #[inline(always)]
     fn run(self) {
-        let Walks { eightfold, mesh, rays, size, hits } = self;
+        let Walks { eightfold, mesh, rays, rays_per_spot, hits } = self;
+        // Bundles of a spot are of one size.
+        let size = rays_per_spot.div_ceil(rays_per_spot.div_ceil(MOST));
         let mut stack = Stack::new();
-        for (rays, hits) in rays.chunks(size).zip(hits.chunks_mut(size)) {
+        let spots = rays.chunks(rays_per_spot).zip(hits.chunks_mut(rays_per_spot));
+        let bundles = spots.flat_map(|(rays, hits)| rays.chunks(size).zip(hits.chunks_mut(size)));
+        for (rays, hits) in bundles {
             match Bundle::new(&eightfold.sphere, rays) {
                 Some(bundle) => {
-                    let met = bundle.nearest(eightfold, mesh, &mut stack);
-                    for ((hit, nearest), ray) in hits.iter_mut().zip(met.nearest).zip(rays) {
-                        *hit = nearest.and_then(|(_, facet)| plane_hit(mesh, facet, ray));
+                    let nearest = bundle.nearest(eightfold, mesh, &mut stack);
+                    for ((hit, facet), ray) in hits.iter_mut().zip(nearest.facets).zip(rays) {
+                        *hit = facet.and_then(|(_, facet)| plane_hit(mesh, facet, ray));
                     }
                 }
                 None => eightfold.closest_one_by_one(mesh, rays, &mut stack, hits),
@@ -98,10 +102,10 @@ impl Wide for Walks<'_> {
 }
 
 impl<'a> Bundle<'a> {
-    /// `None` where the rays do not run along one axis, or cross the base plane too far away for f32.
+    /// `None` for a few rays, or where they do not run along one axis, or cross the base plane too far away for f32.
     #[inline(always)]
     fn new(sphere: &Sphere, rays: &'a [Ray<Global>]) -> Option<Bundle<'a>> {
-        let first = rays.first()?;
+        let first = rays.first().filter(|_| rays.len() >= FEWEST)?;
         let direction = first.direction.xyz();
         let along = direction.abs().max_position();
         let axes = [along, (along + 1) % 3, (along + 2) % 3];
@@ -112,7 +116,7 @@ impl<'a> Bundle<'a> {
         for rays in rays.chunks(LANES) {
             let mut sixteen = Sixteen { at: [[0.0; LANES]; 2], shear: [[0.0; LANES]; 2] };
             for lane in 0..LANES {
-                // What is left of the lanes repeats the last ray.
+                // The lanes beyond the last ray repeat it.
                 let ray = rays[lane.min(rays.len() - 1)];
                 let direction = ray.direction.xyz();
                 let origin = ray.origin.xyz - sphere.centre;
@@ -134,7 +138,8 @@ impl<'a> Bundle<'a> {
             sixteens.push(sixteen);
         }
         // All lengths are within four radii of the centre, and a depth times a shear within six. All rounding together is at
-        // most 48 unit roundoffs of the radius; the factor 2 covers the products and sums of an edge, and the rounding of f64.
+        // most 48 unit roundoffs of the radius; the factor 2 covers the products and sums of an edge, and the rounding of f64 for
+        // rays that start within 10⁸ radii.
         let doubt = 64.0 * f64::from(f32::EPSILON / 2.0);
         let margin_m = (2.0 * doubt * sphere.radius_m * (1.0 + PADDING)) as f32;
         let bounds = |of: fn(&Sixteen) -> &[Lanes; 2], side: usize, margin: f32| {
@@ -153,20 +158,20 @@ impl<'a> Bundle<'a> {
 
     /// Finds the nearest facet of each ray. `stack` must be empty, and is empty afterwards.
     #[inline(always)]
-    fn nearest(&self, eightfold: &Eightfold, mesh: &Mesh, stack: &mut Stack) -> Met {
+    fn nearest(&self, eightfold: &Eightfold, mesh: &Mesh, stack: &mut Stack) -> Nearest {
         let Eightfold { nodes, blocks, .. } = eightfold;
-        let mut met = Met { nearest: vec![None; self.rays.len()], limit: f32::INFINITY };
+        let mut nearest = Nearest { facets: vec![None; self.rays.len()], limit: f32::INFINITY };
         if nodes.is_empty() {
-            return met;
+            return nearest;
         }
         stack.push(0.0, 0);
         while let Some((near, content)) = stack.pop() {
-            if near > met.limit {
+            if near > nearest.limit {
                 continue;
             }
             if content & BLOCK == 0 {
                 let node = &nodes[content as usize];
-                let (boxes, near) = self.boxes(node, met.limit);
+                let (boxes, near) = self.boxes(node, nearest.limit);
                 stack.make_room();
                 let base = stack.len();
                 for lane in boxes {
@@ -176,15 +181,15 @@ impl<'a> Bundle<'a> {
             }
             for block in &blocks[(content ^ BLOCK) as usize..] {
                 for lane in self.facets(block) {
-                    self.meet(mesh, block, lane, &mut met);
+                    self.meet(mesh, block, lane, &mut nearest.facets);
                 }
                 if !block.continues {
                     break;
                 }
             }
-            met.limit = self.limit(eightfold, &met);
+            nearest.limit = self.limit(eightfold, &nearest.facets);
         }
-        met
+        nearest
     }
 
     /// Bounds of where the rays are at a depth, m, on one of the axes across.
@@ -196,7 +201,7 @@ impl<'a> Bundle<'a> {
 
     /// Marks the boxes that a ray may enter before `limit`, and returns the least depth of each, m.
     #[inline(always)]
-    fn boxes(&self, node: &Node, limit: f32) -> (Marks, Boxes) {
+    fn boxes(&self, node: &Node, limit: f32) -> (Marks, Eight) {
         let [along, across, up] = self.axes;
         let (mut near, mut within) = ([0.0; 8], [0.0; 8]);
         for lane in 0..8 {
@@ -236,9 +241,9 @@ impl<'a> Bundle<'a> {
         Marks::of_signs(&within).and(block.live)
     }
 
-    /// Tests one facet against all rays.
+    /// Tests one facet against all rays, of which these are the nearest so far.
     #[inline(always)]
-    fn meet(&self, mesh: &Mesh, block: &Block, lane: usize, met: &mut Met) {
+    fn meet(&self, mesh: &Mesh, block: &Block, lane: usize, nearest: &mut [Option<(f64, u32)>]) {
         let facet = block.facets[lane];
         let corners = block.corners.map(|corner| {
             let [along, across, up] = self.axes.map(|axis| corner[axis][lane]);
@@ -251,9 +256,9 @@ impl<'a> Bundle<'a> {
                 marks &= marks - 1;
                 let Some(line) = self.lines.get(ray) else { break };
                 if let Some(range_m) = line.range_to_facet_m(mesh, facet as usize)
-                    && met.nearest[ray].is_none_or(|nearest| (range_m, facet) < nearest)
+                    && nearest[ray].is_none_or(|nearest| (range_m, facet) < nearest)
                 {
-                    met.nearest[ray] = Some((range_m, facet));
+                    nearest[ray] = Some((range_m, facet));
                 }
             }
         }
@@ -287,12 +292,12 @@ impl<'a> Bundle<'a> {
 
     /// The depth behind the base plane of the farthest hit so far, with the rounding of f32, m; infinite while a ray has none.
     #[inline(always)]
-    fn limit(&self, eightfold: &Eightfold, met: &Met) -> f32 {
+    fn limit(&self, eightfold: &Eightfold, nearest: &[Option<(f64, u32)>]) -> f32 {
         let along = self.axes[0];
         let centre_m = eightfold.sphere.centre[along];
         let mut farthest_m = f64::NEG_INFINITY;
-        for (ray, nearest) in self.rays.iter().zip(&met.nearest) {
-            let Some((range_m, _)) = nearest else { return f32::INFINITY };
+        for (ray, facet) in self.rays.iter().zip(nearest) {
+            let Some((range_m, _)) = facet else { return f32::INFINITY };
             let at_m = ray.origin.xyz[along] + range_m * ray.direction.xyz()[along] - centre_m;
             farthest_m = farthest_m.max((at_m - f64::from(self.base_m)) * f64::from(self.sense));
         }
@@ -311,9 +316,10 @@ mod tests {
     use crate::lanes::at_most;
     use crate::scene::{mannequin, solids};
     use crate::trace::Bvh;
+    use crate::trace::boxes::Boxes;
     use crate::trace::testing::{ray, soup};
 
-    /// So many rays through a spot around a place, from around an origin.
+    /// Rays through a spot around a place, from around an origin.
     fn spot(from: DVec3, to: DVec3, radius: f64, count: usize) -> Vec<Ray<Global>> {
         let aside = |k: usize, turn: f64| {
             let (sin, cos) = (turn * k as f64).sin_cos();
@@ -330,15 +336,22 @@ mod tests {
             from in prop::array::uniform3(-1.0f64..1.0),
             to in prop::array::uniform3(-1.0f64..1.0),
             (far, radius) in (prop::sample::select(vec![0.3, 2.0, 30.0, 1e4]), -4.0f64..1.0),
-            count in 4usize..70,
+            count in 1usize..300,
             facet in 0usize..60,
+            (decade, moved_m) in (-3i32..4, prop::sample::select(vec![0.0, 5.0, 1e5])),
         ) {
+            let mut mesh = mesh;
+            let scale = 10f64.powi(decade);
+            for vertex in &mut mesh.vertices {
+                *vertex = scale * *vertex + DVec3::new(moved_m, 0.0, -moved_m);
+            }
             let bvh = Bvh::new(&mesh);
             // Towards a corner of a facet, where several facets are equally far.
             let corner = mesh.corners(facet % mesh.facets.len())[0];
-            let from = far * DVec3::from(from);
-            for to in [to.into(), corner] {
-                let rays = spot(from, to, 10f64.powf(radius), count);
+            let centre = DVec3::new(moved_m, 0.0, -moved_m);
+            let from = centre + far * scale * DVec3::from(from);
+            for to in [centre + scale * DVec3::from(to), corner] {
+                let rays = spot(from, to, scale * 10f64.powf(radius), count);
                 prop_assert_eq!(bvh.closest_of_spots(&rays, count), bvh.closest_of_each(&rays));
             }
         }
@@ -355,6 +368,8 @@ mod tests {
                 spot(origin, DVec3::new(x, y + 1.1, 0.0), 0.02, count)
             })
             .collect();
+        let sphere = Boxes::new(&body, &[0, 9_000, 20_000]).sphere;
+        assert!(rays.chunks(count).all(|spot| Bundle::new(&sphere, spot).is_some()));
         let alone = bvh.closest_of_each(&rays);
         let met = alone.iter().flatten().count();
         assert!((2_000..20_000).contains(&met), "{met}");
@@ -376,6 +391,8 @@ mod tests {
                 ray(DVec3::new(0.1, 0.0, 0.2), DVec3::new(0.1, 0.0, 0.2) + direction.xyz())
             })
             .collect();
+        let all: Vec<u32> = (0..ball.facets.len() as u32).collect();
+        assert!(Bundle::new(&Boxes::new(&ball, &all).sphere, &apart).is_none());
         let alone = bvh.closest_of_each(&apart);
         assert!(alone.iter().all(Option::is_some));
         assert_eq!(bvh.closest_of_spots(&apart, 64), alone);

@@ -60,21 +60,11 @@ impl<'a> Bvh<'a> {
         hits
     }
 
-    /// As [`closest_of_each`](Self::closest_of_each), for rays of which so many in a row nearly coincide, as those of a spot do.
+    /// The closest hit of each ray of some spots, one spot after the other, computed on one thread. The rays of a spot nearly
+    /// coincide and go through the hierarchy together.
     pub fn closest_of_spots(&self, rays: &[Ray<Global>], rays_per_spot: usize) -> Vec<Option<Hit>> {
-        /// Rays of one task, or more.
-        const RAYS: usize = 256;
-        /// Rays of a spot from which on they are faster together.
-        const LEAST: usize = 4;
-        if rays_per_spot < LEAST {
-            return self.closest_of_each(rays);
-        }
-        let size = rays_per_spot * RAYS.div_ceil(rays_per_spot);
-        let mut hits = allocate_hits(rays.len());
-        let tasks = rays.par_chunks(size).zip(hits.par_chunks_mut(size));
-        tasks.for_each(|(rays, hits)| {
-            bundle::closest(self.eightfold(), self.mesh, rays, rays_per_spot, hits);
-        });
+        let mut hits = vec![None; rays.len()];
+        bundle::closest(self.eightfold(), self.mesh, rays, rays_per_spot, &mut hits);
         hits
     }
 

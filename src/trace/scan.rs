@@ -40,7 +40,7 @@ impl<'a> ScanGeometry<'a> {
         self.tracer.closest(self.bvh, rays)
     }
 
-    /// As [`closest`](Self::closest), for rays of which so many in a row are of one spot.
+    /// As [`closest`](Self::closest), for the rays of spots, one spot after the other.
     ///
     /// # Errors
     /// Those of [`closest`](Self::closest).

@@ -44,14 +44,12 @@ pub enum TraceError {
 }
 
 impl Tracer<'_> {
-    /// Rays without an order that are best given to [`closest`](Self::closest) at once.
+    /// Rays of spots that are best given to [`closest_of_spots`](Self::closest_of_spots) at once: a graphics processor waits
+    /// for its memory, and a processor's caches hold few.
     pub(crate) fn rays_at_once(self) -> usize {
         match self {
-            // A graphics processor waits for its memory.
             Tracer::Gpu(_) => 1 << 18,
-            // What a fan does for each of its facets is shared by all rays.
-            Tracer::Pinhole => 1 << 18,
-            Tracer::Automatic | Tracer::Bvh | Tracer::Brute => 1 << 10,
+            _ => 1 << 10,
         }
     }
 
@@ -69,10 +67,9 @@ impl Tracer<'_> {
             Tracer::Automatic => closest(bvh, rays),
         })
     }
-}
 
-impl Tracer<'_> {
-    /// As [`closest`](Self::closest), for rays of which so many in a row nearly coincide, as those of a spot do.
+    /// As [`closest`](Self::closest), for the rays of spots, one spot after the other. [`Automatic`](Self::Automatic) walks
+    /// the hierarchy.
     ///
     /// # Errors
     /// Those of [`closest`](Self::closest).

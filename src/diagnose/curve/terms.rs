@@ -41,8 +41,10 @@ pub trait Term: Sync {
 
 /// A scattering model at a point. What its terms need of it is computed once.
 pub struct LawAt<'a> {
-    law: &'a Brdf,
-    point: &'a Point,
+    /// The model.
+    pub law: &'a Brdf,
+    /// The point.
+    pub point: &'a Point,
     /// f of the model alone, 1/sr.
     pub f_per_sr: f64,
     parts_per_sr: OnceCell<[f64; 2]>,
