@@ -265,8 +265,7 @@ impl<'a> Paths<'a> {
     /// What each point scatters towards the antenna.
     fn seen(&self, emissions: &[Emission], points: &[RayPoint]) -> Vec<Seen> {
         if let Observer::Receiver { .. } = self.observer {
-            let towards = |point: &RayPoint| emissions[point.chirp].scattered(&point.lit);
-            return points.iter().map(towards).collect();
+            return points.iter().map(|p| emissions[p.chirp].scattered(&p.lit)).collect();
         }
         let regions: Vec<usize> = points.iter().map(|point| self.region(&point.lit.hit)).collect();
         let mut by_region: Vec<usize> = (0..points.len()).collect();

@@ -133,16 +133,15 @@ impl Rays<'_> {
             (0..axes.len() * count).into_par_iter().map(|_| T::default()).collect();
         let tasks = all.chunks_mut(chirps * count).zip(ranges_m.chunks(chirps)).enumerate();
         let tasks: Vec<_> = tasks.collect();
-        let run = |(task, (all, ranges_m)): (usize, (&mut [T], &[Option<f64>]))| {
+        // A graphics processor takes one list after the other.
+        let in_turn = matches!(self.geometry.tracer, Tracer::Gpu(_));
+        let tasks_together = if in_turn { tasks.len() } else { 1 };
+        let tasks = tasks.into_par_iter().with_min_len(tasks_together);
+        tasks.try_for_each(|(task, (all, ranges_m))| {
             self.spots(task * chirps, ranges_m, all, &place)?;
             done(ranges_m.len());
             Ok::<(), TraceError>(())
-        };
-        // A graphics processor takes one list after the other.
-        match self.geometry.tracer {
-            Tracer::Gpu(_) => tasks.into_iter().try_for_each(run)?,
-            _ => tasks.into_par_iter().try_for_each(run)?,
-        }
+        })?;
         Ok((all, ranges_m))
     }
 

@@ -142,15 +142,8 @@ impl<'a> Bundle<'a> {
         // rays that start within 10⁸ radii.
         let doubt = 64.0 * f64::from(f32::EPSILON / 2.0);
         let margin_m = (2.0 * doubt * sphere.radius_m * (1.0 + PADDING)) as f32;
-        let bounds = |of: fn(&Sixteen) -> &[Lanes; 2], side: usize, margin: f32| {
-            let all = sixteens.iter().flat_map(|sixteen| of(sixteen)[side]);
-            let [low, high] = all.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], x| {
-                [least(x, low), most(x, high)]
-            });
-            [low - margin, high + margin]
-        };
-        let at = [0, 1].map(|side| bounds(|sixteen| &sixteen.at, side, margin_m));
-        let shear = [0, 1].map(|side| bounds(|sixteen| &sixteen.shear, side, 0.0));
+        let at = [0, 1].map(|side| bounds(sixteens.iter().map(|rays| &rays.at[side]), margin_m));
+        let shear = [0, 1].map(|side| bounds(sixteens.iter().map(|rays| &rays.shear[side]), 0.0));
         let lines = rays.iter().map(Line::new).collect();
         let sense = sense as f32;
         Some(Bundle { rays, lines, sixteens, axes, base_m, sense, at, shear, margin_m })
@@ -304,6 +297,16 @@ impl<'a> Bundle<'a> {
         // Boxes that begin before the base plane count from there.
         (farthest_m + 4.0 * PADDING * eightfold.sphere.radius_m).max(0.0) as f32
     }
+}
+
+/// Bounds of numbers, farther apart by a margin on either side.
+#[inline(always)]
+fn bounds<'a>(numbers: impl Iterator<Item = &'a Lanes>, margin: f32) -> [f32; 2] {
+    let [mut low, mut high] = [f32::INFINITY, f32::NEG_INFINITY];
+    for &number in numbers.flatten() {
+        (low, high) = (least(number, low), most(number, high));
+    }
+    [low - margin, high + margin]
 }
 
 #[cfg(test)]
