@@ -160,7 +160,7 @@ impl Chirp {
             self.check_range(echo.range_m)?;
             signal.add(self.tone(echo));
         }
-        Ok(signal.samples(self.samples))
+        Ok(signal.samples())
     }
 
     /// Whether a return at a range keeps its place.

@@ -17,12 +17,13 @@ pub(super) struct Tone {
 /// A sum of tones: real and imaginary parts, a block of samples after the other.
 pub(super) struct Signal {
     blocks: Vec<[[f64; LANES]; 2]>,
+    samples: usize,
 }
 
 impl Signal {
     /// Silence of this number of samples.
     pub fn silence(samples: usize) -> Signal {
-        Signal { blocks: vec![[[0.0; LANES]; 2]; samples.div_ceil(LANES)] }
+        Signal { blocks: vec![[[0.0; LANES]; 2]; samples.div_ceil(LANES)], samples }
     }
 
     /// Adds a tone. Turning a phasor costs one product a sample; its error grows to 1e-12 over 4096 samples.
@@ -39,11 +40,11 @@ impl Signal {
         widest(Turning { blocks: &mut self.blocks, phasors, step });
     }
 
-    /// The first samples of this number.
-    pub fn samples(&self, count: usize) -> Vec<Complex<f64>> {
+    /// Its samples.
+    pub fn samples(&self) -> Vec<Complex<f64>> {
         let blocks = self.blocks.iter();
         let samples = blocks.flat_map(|[re, im]| re.iter().zip(im));
-        samples.take(count).map(|(&re, &im)| Complex::new(re, im)).collect()
+        samples.take(self.samples).map(|(&re, &im)| Complex::new(re, im)).collect()
     }
 }
 
@@ -85,7 +86,7 @@ mod tests {
             at_most(bits, || {
                 let mut signal = Signal::silence(4099);
                 [tone, other].into_iter().for_each(|tone| signal.add(tone));
-                signal.samples(4099)
+                signal.samples()
             })
         };
         let widest = samples(512);

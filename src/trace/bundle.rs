@@ -5,7 +5,7 @@
 //! hits are the same bits.
 
 use super::boxes::{PADDING, Sphere};
-use super::eightfold::{BLOCK, Block, Eightfold, Lanes as Eight, Marks, Node, Stack};
+use super::eightfold::{BLOCK, Block, Eightfold, Lanes as Eight, Marks, Node, Stack, around_ray};
 use super::facet::{Line, plane_hit};
 use super::hit::Hit;
 use crate::frames::{Global, Ray};
@@ -262,23 +262,13 @@ impl<'a> Bundle<'a> {
     fn may_meet(&self, corners: &[[f32; 3]; 3], sixteen: &Sixteen) -> u32 {
         let mut marks = 0;
         for lane in 0..LANES {
-            let beside = |[depth, across, up]: [f32; 3]| {
-                let x = across - sixteen.at[0][lane] - sixteen.shear[0][lane] * depth;
-                let y = up - sixteen.at[1][lane] - sixteen.shear[1][lane] * depth;
-                let doubt = self.margin_m * (x.abs() + y.abs() + self.margin_m) + f32::MIN_POSITIVE;
-                [x, y, doubt]
-            };
-            let [a, b, c] = [beside(corners[0]), beside(corners[1]), beside(corners[2])];
-            // An edge function within its bound of zero may have either sign.
-            let edge = |from: [f32; 3], to: [f32; 3]| {
-                let edge = from[0] * to[1] - from[1] * to[0];
-                let doubt = from[2] + to[2];
-                [doubt + edge, doubt - edge]
-            };
-            let (ab, bc, ca) = (edge(a, b), edge(b, c), edge(c, a));
-            let left = least(least(ab[0], bc[0]), ca[0]);
-            let right = least(least(ab[1], bc[1]), ca[1]);
-            marks |= u32::from(most(left, right) >= 0.0) << lane;
+            let beside = corners.map(|[depth, across, up]| {
+                [
+                    across - sixteen.at[0][lane] - sixteen.shear[0][lane] * depth,
+                    up - sixteen.at[1][lane] - sixteen.shear[1][lane] * depth,
+                ]
+            });
+            marks |= u32::from(around_ray(beside, self.margin_m) >= 0.0) << lane;
         }
         marks
     }

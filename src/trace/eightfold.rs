@@ -338,29 +338,33 @@ impl Aim {
         let origin = self.axes.map(|axis| self.origin[axis]);
         let mut within = [0.0; LANES];
         for lane in 0..LANES {
-            // Offset of a corner from the ray, m, and the resulting bound on an edge function, m².
             let beside = |corner: usize| {
                 let depth = corners[corner][0][lane] - origin[0];
                 let x = corners[corner][1][lane] - origin[1] - self.shear[0] * depth;
                 let y = corners[corner][2][lane] - origin[2] - self.shear[1] * depth;
-                // The bound includes the product of two roundings, and underflow.
-                let doubt = self.margin_m * (x.abs() + y.abs() + self.margin_m) + f32::MIN_POSITIVE;
-                [x, y, doubt]
+                [x, y]
             };
-            let (a, b, c) = (beside(0), beside(1), beside(2));
-            // An edge function within its bound of zero may have either sign.
-            let edge = |from: [f32; 3], to: [f32; 3]| {
-                let edge = from[0] * to[1] - from[1] * to[0];
-                let doubt = from[2] + to[2];
-                [doubt + edge, doubt - edge]
-            };
-            let (ab, bc, ca) = (edge(a, b), edge(b, c), edge(c, a));
-            let left = least(least(ab[0], bc[0]), ca[0]);
-            let right = least(least(ab[1], bc[1]), ca[1]);
-            within[lane] = most(left, right);
+            within[lane] = around_ray([beside(0), beside(1), beside(2)], self.margin_m);
         }
         Marks::of_signs(&within).and(block.live)
     }
+}
+
+/// Below zero where a ray certainly passes a facet by, from the offsets of its corners from the ray, m, of which `margin_m` is
+/// twice the bound of the rounding.
+#[inline(always)]
+pub(super) fn around_ray([a, b, c]: [[f32; 2]; 3], margin_m: f32) -> f32 {
+    // An edge function within its bound of zero may have either sign. The bound, m², includes the product of two roundings,
+    // and underflow.
+    let doubt = |[x, y]: [f32; 2]| margin_m * (x.abs() + y.abs() + margin_m) + f32::MIN_POSITIVE;
+    let edge = |from: [f32; 2], to: [f32; 2]| {
+        let (edge, doubt) = (from[0] * to[1] - from[1] * to[0], doubt(from) + doubt(to));
+        [doubt + edge, doubt - edge]
+    };
+    let (ab, bc, ca) = (edge(a, b), edge(b, c), edge(c, a));
+    let left = least(least(ab[0], bc[0]), ca[0]);
+    let right = least(least(ab[1], bc[1]), ca[1]);
+    most(left, right)
 }
 
 /// A set of lanes, one bit per lane.

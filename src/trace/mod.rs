@@ -1,8 +1,8 @@
 //! The closest intersection of each ray with a mesh.
 //!
 //! [`Fan`] traces rays of one origin, as a scan has them, without building a hierarchy. [`Bvh`] traces any rays by a
-//! hierarchy of boxes, those of a spot together, and [`Gpu`] does so on a graphics processor. All of them search in f32, and decide and
-//! measure in f64. [`Tracer`] chooses among them. [`brute`], the naive loop over all facets, is their test oracle.
+//! hierarchy of boxes, those of a spot together, and [`Gpu`] does so on a graphics processor. All of them search in
+//! f32, and decide and measure in f64. [`Tracer`] chooses among them. [`brute`], the naive loop over all facets, is their test oracle.
 //!
 //! The mesh must pass [`Mesh::validate`](crate::geometry::Mesh::validate) and lie within 100 km of the origin, where
 //! f32 is precise enough. Facets without area are never hit.
