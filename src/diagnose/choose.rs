@@ -178,7 +178,7 @@ struct Contender {
 struct Settled<'a> {
     trial: usize,
     candidate: Candidate,
-    /// What it is [worth](State::worth), less what chance gives the best of its starts.
+    /// What it is [worth](Scorer::worth), less what chance gives the best of its starts.
     worth: f64,
     state: State<'a>,
 }
@@ -210,7 +210,7 @@ fn add_best<'a>(search: &Search, model: &mut Explanation<'a>, trials: &mut [Tria
         let Trial { space, fit, candidate, tried, .. } = &trials[one.trial];
         let (space, fit, held_out) = (space.clone(), fit.clone(), one.held_out.clone());
         let state = scorer.settle(&model.state, space, fit, held_out);
-        let worth = state.worth() - gain_of_starts(*tried);
+        let worth = scorer.worth(&state) - gain_of_starts(*tried);
         settled.push(Settled { trial: one.trial, candidate: candidate.clone(), worth, state });
     }
     let most = settled.iter().max_by(|a, b| a.worth.total_cmp(&b.worth));

@@ -62,7 +62,8 @@ fn contest<'a>(
     let is_tied =
         is_as_good([better, se], ahead, errors) && is_as_good([-better, se], -ahead, errors);
     let by_starts = gain_of_starts(tried);
-    let [own, other] = [state.worth() - last.by_starts, with_rival.worth() - by_starts];
+    let own = scorer.worth(state) - last.by_starts;
+    let other = scorer.worth(&with_rival) - by_starts;
     let is_better = if is_tied { other > own } else { better > 0.0 };
     let mut loser = rival.name();
     if is_better {

@@ -27,8 +27,10 @@ const WIDE_TO_NARROW: [f64; 3] = [1.0, 0.25, 0.06];
 /// Distances along the axes of the curvature that are tried across such jumps, in standard deviations but no more
 /// than an effect's steps.
 const ALONG_AXES: [f64; 4] = [0.3, 1.0, 3.0, 10.0];
-/// Largest change of ln mean over a difference quotient of a smooth surface.
+/// Largest change of ln mean over a difference quotient of a smooth surface, and of the range, m, where it is not within a few
+/// standard deviations.
 const SMOOTH: f64 = 0.5;
+const SMOOTH_M: f64 = 0.003;
 /// How often a step that does not improve is halved.
 const HALVINGS: usize = 5;
 
@@ -170,9 +172,13 @@ impl Problem<'_> {
         let terms = self.terms(space, at);
         let slopes = self.slopes(space, at, [&lower, &upper], &terms);
         // The shots that an edge passes over have no curvature.
+        let smooth_m = SMOOTH_M.max(3.0 * self.declared.range_sd_m);
         let smooth = local(&terms, &slopes, |shot| {
             let mut of_effects = slopes.iter().skip(space.base_len());
-            of_effects.all(|slopes| slopes[shot].ln_mean.abs() * EFFECT_STEP < SMOOTH)
+            of_effects.all(|slopes| {
+                let Slope { ln_mean, range_m, .. } = slopes[shot];
+                ln_mean.abs() * EFFECT_STEP < SMOOTH && range_m.abs() * EFFECT_STEP < smooth_m
+            })
         });
         let axes = smooth.curvature.symmetric_eigen();
         let mut best = (self.ln_likelihood(space, at), None);
@@ -204,21 +210,21 @@ impl Problem<'_> {
         let of_cells = of_free(products_of_cells(&slopes, folds));
         let of_shots = of_free(products(&terms, [&slopes, &slopes]));
         let of_model = deviations(&of_shots);
-        let mut is_told = vec![true; free.len()];
+        let mut told = of_model.clone();
         if !space.moving().is_empty() {
             // Facets that move under the rays change ln p by steps, which slopes over another width do not share. They would
             // tell how a ball is turned.
             let wide = self.slopes_over(WIDE_TO_NARROW[0], space, at, [&lower, &upper], &terms);
             let both = of_free(products(&terms, [&slopes, &wide]));
             let of_both = deviations(&(0.5 * (&both + both.transpose())));
-            is_told = of_both.iter().zip(&of_model).map(is_told_by_both).collect();
+            told = of_both.iter().zip(&of_model).map(told_by_both).collect();
         }
         let inverse = of_shots.try_inverse().map(|inverse| &inverse * of_cells * &inverse);
         let mut sd = vec![f64::INFINITY; at.len()];
-        for (place, (&i, of_model)) in free.iter().zip(of_model).enumerate() {
+        for (place, (&i, told)) in free.iter().zip(told).enumerate() {
             let over_cells =
                 inverse.as_ref().map_or(0.0, |all| all[(place, place)].max(0.0).sqrt());
-            if let Some(of_model) = of_model.filter(|_| is_told[place]) {
+            if let Some(of_model) = told {
                 sd[i] = of_model.max(over_cells);
             }
         }
@@ -242,10 +248,12 @@ fn products(terms: &[Term], [one, other]: [&[Vec<Slope>]; 2]) -> DMatrix<f64> {
     })
 }
 
-/// Whether what slopes over two widths share tells an unknown nearly as well as those of one seem to.
-fn is_told_by_both((both, one): (&Option<f64>, &Option<f64>)) -> bool {
+/// Standard deviation of an unknown by what slopes over two widths share, where that tells it nearly as well as those of one
+/// seem to.
+fn told_by_both((both, one): (&Option<f64>, &Option<f64>)) -> Option<f64> {
     const WIDER: f64 = 3.0;
-    both.zip(*one).is_some_and(|(both, one)| both < WIDER * one)
+    let (both, one) = both.zip(*one)?;
+    (both < WIDER * one).then_some(both.max(one))
 }
 
 /// Sum of the products of the cells' scores.

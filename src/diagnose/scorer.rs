@@ -47,13 +47,6 @@ pub(super) struct State<'a> {
     pub held_out: HeldOut,
 }
 
-impl State<'_> {
-    /// ln likelihood, less what speaks against the point of the fit.
-    pub fn worth(&self) -> f64 {
-        self.fit.ln_likelihood - self.space.against(&self.fit.at)
-    }
-}
-
 /// What a model says of data that took no part in its fit.
 #[derive(Clone, Default)]
 pub(super) struct HeldOut {
@@ -65,6 +58,15 @@ pub(super) struct HeldOut {
 }
 
 impl Scorer<'_> {
+    /// ln likelihood, less what speaks against the point of the fit and Schwarz's penalty for every number of the effects (Ann.
+    /// Stat. 6 (1978) 461). It compares models that predict equally well.
+    pub fn worth(&self, state: &State) -> f64 {
+        let State { space, fit, .. } = state;
+        let numbers = (fit.at.len() - space.base_len()) as f64;
+        let penalty = 0.5 * numbers * self.problem.independent_shots().max(1.0).ln();
+        fit.ln_likelihood - space.against(&fit.at) - penalty
+    }
+
     /// A fitted model with its held-out scores.
     pub fn state<'a>(&self, space: Space<'a>, fit: Fit) -> State<'a> {
         let held_out = self.held_out(&space, &fit.at);

@@ -19,6 +19,8 @@ use crate::fit::minimise::Minimise;
 const STARTS: usize = 2;
 /// How often a fit that has not converged is continued.
 const LONGER: usize = 3;
+/// Share of the best gain from which the fit of a target that moves is continued, too.
+const SHARE_TO_CONTINUE: f64 = 0.8;
 /// Gain in ln likelihood for which it is continued once more.
 const WORTH_MORE: f64 = 3.0;
 /// Distances by which the shape of a start is moved, in steps of the parameters.
@@ -129,10 +131,16 @@ impl<'p> Search<'p> {
         let hopeless = SHARE_OF_HOPE * largest.least_gain(true, shots);
         self.refit_shortlist(state, &mut trials, round, hopeless);
         sort(&mut trials);
-        if let Some(first) = trials.first_mut() {
-            self.continue_fit(state, first, hopeless);
-            sort(&mut trials);
+        let best = trials.first().map_or(0.0, |first| first.candidate.gain);
+        for (place, trial) in trials.iter_mut().enumerate() {
+            // A flexible motion may have found a way that a simple one has not.
+            let may_catch_up =
+                trial.effect.moves() && trial.candidate.gain > SHARE_TO_CONTINUE * best;
+            if place == 0 || may_catch_up {
+                self.continue_fit(state, trial, hopeless);
+            }
         }
+        sort(&mut trials);
         trials
     }
 
@@ -369,7 +377,7 @@ impl<'p> Search<'p> {
         trial.fit = fit;
     }
 
-    /// Continues the fit of the best effect while it gains: a fit that moves facets under the rays may stop
+    /// Continues the fit of an effect while it gains: a fit that moves facets under the rays may stop
     /// before a jump of ln p.
     fn continue_fit(&self, state: &State, trial: &mut Trial, hopeless: f64) {
         for _ in 0..LONGER {
