@@ -5,8 +5,9 @@
 //! | intersections of the rays of each chirp with the target | `spot.rs`, equation (7) |
 //! | the surfaces of the target | `surface.rs` |
 //! | what the target lets through | `sheet.rs`, `sheet_energy.rs` |
-//! | power that arrives at an antenna by single paths | `paths.rs`, equation (11) |
-//! | … and by second-order paths | `bounce.rs` |
+//! | what the rays light, directly and by way of a first surface | `light.rs`, `bounce.rs` |
+//! | power that arrives at an antenna | `paths.rs`, equation (11) |
+//! | … in its polarisation | `polarised.rs` |
 //! | … with declared physical effects | `effect_scan.rs` |
 //! | the wave of a mirror that the spot reaches beyond | `coherent.rs` |
 //! | speckle, a field fixed to the surface | `speckle/` |
@@ -32,9 +33,11 @@ mod error;
 mod facet_steps;
 mod image;
 mod layers;
+mod light;
 mod observer;
 mod path;
 mod paths;
+mod polarised;
 mod returns;
 mod scan;
 mod setup;
@@ -55,7 +58,7 @@ pub use facet_steps::facet_steps;
 pub use image::{CHANNELS, power_image};
 pub(crate) use layers::{Layer, layers};
 pub use observer::Observer;
-pub use scan::{Scan, beat_signals, shade, trace, trace_placed};
+pub use scan::{Scan, beat_signals, shade, shade_each, trace, trace_placed};
 pub use setup::{MOST_SHEETS, Setup};
 pub use sheet::Sheet;
 pub use sheet_energy::SheetGain;

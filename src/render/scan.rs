@@ -8,7 +8,7 @@ use super::echo::{Echo, Echoes};
 use super::effect_scan::{self, EffectScan};
 use super::error::RenderError;
 use super::observer::Observer;
-use super::paths::Paths;
+use super::paths::{Paths, of_antennas};
 use super::setup::Setup;
 use super::spot::{self, Footprints};
 use super::tones::Beats;
@@ -100,25 +100,71 @@ pub fn shade(
     observer: Observer,
     done: &(dyn Fn(usize) + Sync),
 ) -> Result<Scan, RenderError> {
+    match shade_each(setup, footprints, &[observer], done) {
+        Ok(mut scans) => Ok(scans.swap_remove(0)),
+        Err((_, error)) => Err(error),
+    }
+}
+
+/// As [`shade`], at each of several antennas. What the radar lights is traced once for all of them; `done` hears of every
+/// chirp once for each.
+///
+/// # Errors
+/// The place in `observers` of the first antenna that has an error of [`shade`], and the error.
+pub fn shade_each(
+    setup: &Setup,
+    footprints: &Footprints,
+    observers: &[Observer],
+    done: &(dyn Fn(usize) + Sync),
+) -> Result<Vec<Scan>, (usize, RenderError)> {
+    let (mut detectors, mut antennas) = (Vec::new(), Vec::new());
+    for (place, &observer) in observers.iter().enumerate() {
+        let (detector, paths) =
+            prepared(setup, footprints, observer).map_err(|error| (place, error))?;
+        detectors.push(detector);
+        antennas.push(paths);
+    }
+    let target_from_global = setup.geometry.radar.frames().global_from_target.inverse();
+    let echoes = observers.iter().zip(&detectors);
+    let echoes: Vec<Echoes> = echoes
+        .map(|(&observer, detector)| Echoes {
+            setup,
+            footprints,
+            observer,
+            detector,
+            target_from_global,
+        })
+        .collect();
+    let found = of_antennas(&antennas, done, |antenna, chirp, hits, of_chirp, found| {
+        let mut seen = Vec::new();
+        detectors[antenna].observe(chirp, of_chirp, &mut seen)?;
+        echoes[antenna].append(chirp, hits, of_chirp, &seen, found);
+        Ok::<(), RenderError>(())
+    });
+    let hits = footprints.chirps().filter(|hits| hits.iter().any(Option::is_some)).count();
+    let scans = found.into_iter().zip(&detectors).enumerate();
+    let scans = scans.map(|(place, (echoes, detector))| {
+        Ok(Scan {
+            chirps: setup.geometry.chirps.rays.len(),
+            hits,
+            echoes: echoes.map_err(|error| (place, error))?,
+            threshold_w: detector.threshold_w(),
+            noise_w: detector.noise_w(),
+        })
+    });
+    scans.collect()
+}
+
+/// The receiver of an antenna, and the paths to it.
+fn prepared<'a>(
+    setup: &'a Setup<'a>,
+    footprints: &'a Footprints,
+    observer: Observer,
+) -> Result<(Detector<'a>, Paths<'a>), RenderError> {
     check(setup, footprints, observer)?;
     let effects = EffectScan::new(setup, observer);
     let detector = Detector::new(setup, observer, effects.as_ref(), footprints)?;
-    let paths = Paths::new(setup, observer, footprints, effects);
-    let target_from_global = setup.geometry.radar.frames().global_from_target.inverse();
-    let echoes = Echoes { setup, footprints, observer, detector: &detector, target_from_global };
-    let echoes = paths.of_all(done, |chirp, hits, of_chirp, found| {
-        let mut seen = Vec::new();
-        detector.observe(chirp, of_chirp, &mut seen)?;
-        echoes.append(chirp, hits, of_chirp, &seen, found);
-        Ok::<(), RenderError>(())
-    })?;
-    Ok(Scan {
-        chirps: setup.geometry.chirps.rays.len(),
-        hits: footprints.chirps().filter(|hits| hits.iter().any(Option::is_some)).count(),
-        echoes,
-        threshold_w: detector.threshold_w(),
-        noise_w: detector.noise_w(),
-    })
+    Ok((detector, Paths::new(setup, observer, footprints, effects)))
 }
 
 /// Computes the sampled beat signals of a scan at an antenna, chirp after chirp; those of a chirp are empty without a
@@ -132,10 +178,7 @@ pub fn beat_signals<'a>(
     footprints: &'a Footprints,
     observer: Observer,
 ) -> Result<impl Iterator<Item = Result<Beats, RenderError>> + use<'a>, RenderError> {
-    check(setup, footprints, observer)?;
-    let effects = EffectScan::new(setup, observer);
-    let detector = Detector::new(setup, observer, effects.as_ref(), footprints)?;
-    let paths = Paths::new(setup, observer, footprints, effects);
+    let (detector, paths) = prepared(setup, footprints, observer)?;
     let hits = footprints.hits.chunks(footprints.rays_per_chirp.max(1));
     Ok(hits
         .enumerate()

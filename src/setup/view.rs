@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::frames::Point;
 use crate::radar::polarisation::Receive;
 use crate::radar::{Channel, Radar};
-use crate::render::{Footprints, Observer, Scan, Setup, shade, trace_placed};
+use crate::render::{Footprints, Observer, Scan, Setup, shade, shade_each, trace_placed};
 use crate::scene::file::ReceiverEntry;
 
 /// What one antenna received.
@@ -105,17 +105,23 @@ impl<'a> Assembly<'a> {
         advance: &(dyn Fn(usize) + Sync),
     ) -> Result<Vec<View<'a>>, Error> {
         let ready = self.ready();
-        let scan = self.shade(setup, footprints, advance)?;
+        let receivers = &ready.scene.file.receiver;
+        let antennas = receivers.iter().map(|receiver| antenna(receiver, ready.scene.radar()));
+        let apart = (1u32..).zip(antennas).map(|(number, Antenna { position, aperture_m2 })| {
+            Observer::Receiver { number, position, aperture_m2 }
+        });
+        let observers: Vec<Observer> = std::iter::once(Observer::Radar).chain(apart).collect();
+        let scans = shade_each(setup, footprints, &observers, advance);
+        let scans = scans.map_err(|(place, error)| {
+            let receiver = place.checked_sub(1).map(|number| &receivers[number].name);
+            let about = receiver.map_or(String::new(), |name| format!("receiver `{name}`: "));
+            ready.render_error(&about, error)
+        })?;
+        let receivers = std::iter::once(None).chain(receivers.iter().map(Some));
+        let views = receivers.zip(observers).zip(scans);
         let channel = setup.channel;
-        let mut views = vec![View { receiver: None, observer: Observer::Radar, channel, scan }];
-        for (number, receiver) in (1u32..).zip(&ready.scene.file.receiver) {
-            let Antenna { position, aperture_m2 } = antenna(receiver, ready.scene.radar());
-            let observer = Observer::Receiver { number, position, aperture_m2 };
-            let scan = shade(setup, footprints, observer, advance).map_err(|error| {
-                ready.render_error(&format!("receiver `{}`: ", receiver.name), error)
-            })?;
-            views.push(View { receiver: Some(receiver), observer, channel, scan });
-        }
-        Ok(views)
+        Ok(views
+            .map(|((receiver, observer), scan)| View { receiver, observer, channel, scan })
+            .collect())
     }
 }
