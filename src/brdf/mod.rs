@@ -14,6 +14,7 @@
 mod albedo;
 mod backscatter;
 mod beyond_beam;
+mod bistatic;
 mod kind;
 mod models;
 mod outline;
@@ -29,6 +30,8 @@ pub use albedo::{ALBEDO_SLACK, Excess, albedo, incidences_rad};
 pub(crate) use backscatter::Look;
 pub use backscatter::{Facets, Term};
 pub use beyond_beam::BeyondBeam;
+pub use bistatic::Lobe;
+pub(crate) use bistatic::{Bistatic, Pair};
 pub use kind::{Key, Kind};
 pub use models::*;
 pub use outline::{DEGREES, Outline};

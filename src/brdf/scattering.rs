@@ -3,6 +3,7 @@
 use num_complex::Complex;
 
 use super::backscatter::Term;
+use super::bistatic::Lobe;
 use super::parameter::Visitor;
 use super::validity::Condition;
 use crate::frames::{Direction, Surface};
@@ -60,6 +61,11 @@ pub trait Scattering: Sync {
     /// f in exact backscatter as a sum of closed forms; `None` for a model whose f depends on the azimuth,
     /// or that has no such sum.
     fn backscatter(&self) -> Option<Vec<Term>> {
+        None
+    }
+
+    /// f(i, o) as a sum of closed forms, whose narrow lobes are those of facets; `None` for a model that has no such sum.
+    fn lobes(&self) -> Option<Vec<Lobe>> {
         None
     }
 

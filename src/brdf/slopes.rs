@@ -216,7 +216,7 @@ const MOST_T: f64 = 14.0;
 const STEPS: usize = 32;
 
 /// Every t of the sum with its weight e^{−t}·dt.
-static NODES: LazyLock<[(f64, f64); STEPS]> = LazyLock::new(|| {
+pub(super) static SLOPE_NODES: LazyLock<[(f64, f64); STEPS]> = LazyLock::new(|| {
     std::array::from_fn(|step| {
         let t = MOST_T * (-STEP_LN * step as f64).exp();
         (t, (-t).exp() * t * STEP_LN)
@@ -226,21 +226,27 @@ static NODES: LazyLock<[(f64, f64); STEPS]> = LazyLock::new(|| {
 /// ∫₀^∞ e^{−t}·P(t) dt by the trapezoidal rule in ln t, from large t down.
 fn mixture(of_t: impl Fn(f64) -> Gaussian) -> f64 {
     let mut sum = 0.0;
-    for (t, weight) in *NODES {
+    for (t, weight) in *SLOPE_NODES {
         let gaussian = of_t(t);
         let term = weight * gaussian.density;
         sum += term;
-        // Once the exponential has become flat, every term is a fifth of the one before.
-        if gaussian.exponent < 0.5 && term < 1e-4 * sum {
+        if is_negligible(gaussian.exponent, term, sum) {
             break;
         }
     }
     sum
 }
 
+/// Whether what follows a term of the sum adds nothing to it. Once the exponential has become flat, every term is a fifth of
+/// the one before.
+#[inline(always)]
+pub(super) fn is_negligible(exponent: f64, term: f64, sum: f64) -> bool {
+    (exponent < 0.5) & (term < 1e-4 * sum)
+}
+
 /// ∫₀^∞ e^{−t}·f(t) dt of a function that changes over factors of t.
 pub(super) fn over_exponential(of_t: impl Fn(f64) -> f64) -> f64 {
-    NODES.iter().map(|&(t, weight)| weight * of_t(t)).sum()
+    SLOPE_NODES.iter().map(|&(t, weight)| weight * of_t(t)).sum()
 }
 
 #[cfg(test)]

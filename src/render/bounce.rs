@@ -14,6 +14,7 @@ use glam::DVec3;
 
 use super::spot::GOLDEN;
 use crate::frames::{Direction, Global, Ray, Surface};
+use crate::lanes::{Wide, exp, ln, widest};
 use crate::radar::GaussianBeam;
 use crate::radar::random::Key;
 
@@ -60,18 +61,39 @@ pub(super) fn directions(
     source: Direction<Surface>,
     count: usize,
     key: Key,
-) -> impl Iterator<Item = (Direction<Surface>, f64)> {
-    let [x, y, z] = source.xyz().to_array();
-    let mirrored = DVec3::new(-x, -y, z);
+) -> Vec<(Direction<Surface>, f64)> {
+    let mirrored = source.mirrored().xyz();
     let mut draws = key.draws();
     let (radial, turn) = (draws.uniform(), draws.uniform());
-    (0..count).filter_map(move |number| {
+    let drawn = (0..count).filter_map(|number| {
         let along = (number as f64 * GOLDEN + turn).fract();
         let direction = sample((number as f64 + radial) / count as f64, along, mirrored);
-        let local = Direction::new(direction)?;
-        let weight = 1.0 / (density_per_sr(direction, mirrored) * count as f64);
-        (local.cos_theta() > 0.0).then_some((local, weight))
-    })
+        Direction::new(direction).filter(|local| local.cos_theta() > 0.0)
+    });
+    let drawn: Vec<Direction<Surface>> = drawn.collect();
+    let cosines =
+        drawn.iter().map(|direction| [direction.cos_theta(), direction.xyz().dot(mirrored)]);
+    let mut weights_sr = vec![0.0; drawn.len()];
+    widest(Weights { cosines: &cosines.collect::<Vec<_>>(), count, weights_sr: &mut weights_sr });
+    drawn.into_iter().zip(weights_sr).collect()
+}
+
+/// The solid angle, sr, that each direction stands for, from its cosines to the normal and to the direction of the mirror.
+struct Weights<'a> {
+    cosines: &'a [[f64; 2]],
+    count: usize,
+    weights_sr: &'a mut [f64],
+}
+
+impl Wide for Weights<'_> {
+    type Answer = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for (weight_sr, &cosines) in self.weights_sr.iter_mut().zip(self.cosines) {
+            *weight_sr = 1.0 / (density_per_sr(cosines) * self.count as f64);
+        }
+    }
 }
 
 /// A direction from the mixture. `share` from 0 to 1 picks the part and the angle from its axis;
@@ -90,14 +112,16 @@ fn about(axis: DVec3, cos: f64, turn: f64) -> DVec3 {
     let across = axis.any_orthonormal_vector();
     let sin = (1.0 - cos * cos).max(0.0).sqrt();
     let azimuth = TAU * turn;
-    cos * axis + sin * (azimuth.cos() * across + azimuth.sin() * axis.cross(across))
+    let (sin_azimuth, cos_azimuth) = azimuth.sin_cos();
+    cos * axis + sin * (cos_azimuth * across + sin_azimuth * axis.cross(across))
 }
 
-fn density_per_sr(direction: DVec3, mirrored: DVec3) -> f64 {
-    let cos = direction.dot(mirrored).max(0.0);
-    let lobe = |exponent: f64| (exponent + 1.0) / TAU * cos.powf(exponent);
-    let lobes: f64 = LOBES.into_iter().map(lobe).sum();
-    0.5 * direction.z.max(0.0) / PI + lobes / 6.0
+/// Density of the mixture, from the cosines to the normal, above 0, and to the direction of the mirror.
+#[inline(always)]
+fn density_per_sr([cos_theta, cos_to_mirror]: [f64; 2]) -> f64 {
+    let ln_cos = ln(if cos_to_mirror > 0.0 { cos_to_mirror } else { 0.0 });
+    let [a, b, c] = LOBES.map(|exponent| (exponent + 1.0) / TAU * exp(exponent * ln_cos));
+    0.5 * cos_theta / PI + (a + b + c) / 6.0
 }
 
 #[cfg(test)]
@@ -118,6 +142,7 @@ mod tests {
         let source = Direction::from_angles(theta_rad, 0.7);
         let of_chirp = |chirp| -> f64 {
             directions(source, 64, key(chirp))
+                .into_iter()
                 .map(|(o, weight_sr)| surface.f_per_sr(source, o) * o.cos_theta() * weight_sr)
                 .sum()
         };
@@ -187,10 +212,10 @@ mod tests {
     #[test]
     fn directions_leave_the_surface_and_repeat_themselves() {
         let source = Direction::from_angles(1.4, 0.0);
-        let these: Vec<_> = directions(source, 32, key(1)).collect();
+        let these = directions(source, 32, key(1));
         assert!(these.len() > 16 && these.iter().all(|(o, _)| o.cos_theta() > 0.0));
-        let again: Vec<_> = directions(source, 32, key(1)).collect();
+        let again = directions(source, 32, key(1));
         assert_eq!(these, again);
-        assert_ne!(these, directions(source, 32, key(2)).collect::<Vec<_>>());
+        assert_ne!(these, directions(source, 32, key(2)));
     }
 }

@@ -14,7 +14,7 @@ use super::setup::Setup;
 use super::sheet::Passage;
 use super::spot::{self, Footprints, Spot};
 use super::surface::Surface;
-use crate::brdf::{NarrowLobe, Seen};
+use crate::brdf::{Bistatic, NarrowLobe, Pair, Seen};
 use crate::frames::{Direction, Global, Point, Ray, Surface as Local};
 use crate::radar::Beam;
 use crate::radar::random::{Key, Purpose};
@@ -27,6 +27,8 @@ pub(super) struct Light<'a> {
     beam: Beam,
     /// The rays of a spot.
     pub samples: Vec<DVec2>,
+    /// The laws of the regions.
+    pub laws: Vec<Bistatic<'a>>,
 }
 
 /// What the rays of some chirps light.
@@ -84,7 +86,10 @@ pub(super) struct Place<'a> {
 impl<'a> Light<'a> {
     pub fn new(setup: &'a Setup<'a>, footprints: &'a Footprints) -> Light<'a> {
         let beam = Beam::new(setup.geometry.radar);
-        Light { setup, footprints, beam, samples: spot::samples(footprints.rays_per_chirp) }
+        let samples = spot::samples(footprints.rays_per_chirp);
+        let surfaces = setup.surfaces.iter();
+        let laws = surfaces.map(|surface| Bistatic::new(surface.scattering)).collect();
+        Light { setup, footprints, beam, samples, laws }
     }
 
     pub fn rays_per_chirp(&self) -> usize {
@@ -165,7 +170,7 @@ impl<'a> Light<'a> {
         key: Key,
         onward: &mut Vec<Onward<'a>>,
     ) {
-        let (from, law) = (&point.place, point.place.surface.scattering);
+        let from = &point.place;
         let mut send = |direction, share, first, m| {
             if share <= 0.0 {
                 return;
@@ -176,11 +181,14 @@ impl<'a> Light<'a> {
                 onward.push(Onward { share, first, m, passage, place });
             }
         };
-        for (direction, weight) in directions(from.source, bounce.rays, key) {
-            let first = law.apart_from_narrow_lobes(from.source, direction);
+        let drawn = directions(from.source, bounce.rays, key);
+        let pairs = drawn.iter().map(|&(o, _)| Pair { beam_rad: 0.0, i: from.source, o });
+        let law = &self.laws[self.region(&from.hit)];
+        let scattered = law.apart_from_narrow_lobes(&pairs.collect::<Vec<_>>());
+        for (&(direction, weight), first) in drawn.iter().zip(scattered) {
             send(direction, first.f_per_sr * direction.cos_theta() * weight, first, 0.0);
         }
-        for NarrowLobe { share, m } in law.narrow_lobes(from.source) {
+        for NarrowLobe { share, m } in from.surface.scattering.narrow_lobes(from.source) {
             send(from.source.mirrored(), share, Seen::mirror(0.0), m);
         }
     }

@@ -28,7 +28,7 @@ use super::setup::Setup;
 use super::sheet::Passage;
 use super::spot::{self, Footprints, Spot};
 use super::surface::Orientation;
-use crate::brdf::{Retro, Seen};
+use crate::brdf::{Pair, Retro, Seen};
 use crate::effects::MeanEcho;
 use crate::frames::{Direction, Surface as Local};
 use crate::radar::{Channel, Detection, Link};
@@ -209,6 +209,7 @@ impl<'a> Paths<'a> {
             views.extend(points.iter().map(|point| reception.view(point)));
         }
         let seen = self.seen(&lit.points, &views);
+        let seconds = self.seconds(lit, &receptions);
         let (mut paths, mut direct) = (Vec::new(), Vec::new());
         for (reception, hits) in receptions.iter().zip(hits.chunks(self.light.rays_per_chirp())) {
             paths.clear();
@@ -216,7 +217,8 @@ impl<'a> Paths<'a> {
             for place in reception.chirp.points.clone() {
                 let point = &lit.points[place];
                 direct.push(RayPath { ray: point.sample, place: paths.len() });
-                let onward = &lit.onward[point.onward.clone()];
+                let onward = lit.onward[point.onward.clone()].iter();
+                let onward = onward.zip(&seconds[point.onward.clone()]);
                 reception.scatter(point, &views[place], seen[place], onward, &mut paths);
             }
             let number = reception.chirp.number;
@@ -228,28 +230,40 @@ impl<'a> Paths<'a> {
 
     /// What each point scatters towards the antenna, as it views them.
     fn seen(&self, points: &[LitPoint], views: &[View]) -> Vec<Seen> {
-        if let Observer::Receiver { .. } = self.observer {
-            return points
-                .iter()
-                .zip(views)
-                .map(|(point, view)| view.scattered(&point.place))
-                .collect();
-        }
-        let regions: Vec<usize> =
-            points.iter().map(|point| self.light.region(&point.place.hit)).collect();
-        let mut by_region: Vec<usize> = (0..points.len()).collect();
-        by_region.sort_by_key(|&place| regions[place]);
-        let mut seen = vec![Seen::default(); points.len()];
-        for here in by_region.chunk_by(|&a, &b| regions[a] == regions[b]) {
-            let region = regions[here[0]];
-            let (retro, surface) = (&self.retros[region], &self.light.setup.surfaces[region]);
-            let looks =
-                here.iter().map(|&place| (views[place].beam_rad, points[place].place.source));
-            for (&place, of_look) in here.iter().zip(surface.seen_straight_back(retro, looks)) {
-                seen[place] = of_look;
+        let regions = points.iter().map(|point| self.light.region(&point.place.hit));
+        by_region(regions, |region, here| {
+            let surface = &self.light.setup.surfaces[region];
+            let of_each = here.iter().map(|&at| (&points[at].place, &views[at]));
+            match self.retros.get(region) {
+                Some(retro) => {
+                    let looks = of_each.map(|(place, view)| (view.beam_rad, place.source));
+                    surface.seen_straight_back(retro, looks)
+                }
+                None => {
+                    let pairs = of_each.map(|(place, view)| view.pair(place)).collect();
+                    surface.seen_by_each(&self.light.laws[region], pairs)
+                }
+            }
+        })
+    }
+
+    /// How the antenna sees the second surfaces, one for each that power goes on to.
+    fn seconds(&self, lit: &Lit, receptions: &[Reception]) -> Vec<Second> {
+        let mut seconds = Vec::with_capacity(lit.onward.len());
+        for reception in receptions {
+            for point in &lit.points[reception.chirp.points.clone()] {
+                let onward = lit.onward[point.onward.clone()].iter();
+                seconds.extend(onward.map(|onward| reception.second(onward)));
             }
         }
-        seen
+        let regions = lit.onward.iter().map(|onward| self.light.region(&onward.place.hit));
+        let seen = by_region(regions, |region, here| {
+            let of_each = here.iter().map(|&at| seconds[at].view.pair(&lit.onward[at].place));
+            let surface = &self.light.setup.surfaces[region];
+            surface.seen_by_each(&self.light.laws[region], of_each.collect())
+        });
+        seconds.iter_mut().zip(seen).for_each(|(second, seen)| second.seen = seen);
+        seconds
     }
 
     /// Changes the paths of a chirp by what depends on all of them; `direct` are those by way of one surface.
@@ -274,9 +288,9 @@ struct Reception<'a> {
 }
 
 impl View {
-    /// What a place scatters towards the antenna.
-    fn scattered(&self, place: &Place) -> Seen {
-        place.surface.seen_by(self.beam_rad, place.source, self.towards)
+    /// The directions of the light and of the antenna at a place.
+    fn pair(&self, place: &Place) -> Pair {
+        Pair { beam_rad: self.beam_rad, i: place.source, o: self.towards }
     }
 }
 
@@ -342,13 +356,24 @@ impl<'a> Reception<'a> {
         }
     }
 
+    /// How the antenna sees a second surface; what this scatters is still open.
+    fn second(&self, Onward { place, m, .. }: &Onward) -> Second {
+        let (gain, in_main_lobe) = self.gain(&place.hit);
+        let mut view = self.view_of_second(place, in_main_lobe);
+        // The beam's width counts once, here: exp(−ε²/4δ²) for the angle ε to its wavefront.
+        let beam_rad = view.beam_rad;
+        view.beam_rad = beam_rad.hypot(*m);
+        let beam_share = (beam_rad / view.beam_rad).powi(2);
+        Second { view, gain, beam_share, seen: Seen::default() }
+    }
+
     /// Appends the paths by way of a point, of which the antenna sees this, and which sends power on.
-    fn scatter(
+    fn scatter<'b>(
         &self,
         point: &LitPoint,
         view: &View,
         seen: Seen,
-        onward: &[Onward],
+        onward: impl ExactSizeIterator<Item = (&'b Onward<'b>, &'b Second)>,
         paths: &mut Vec<Path>,
     ) {
         let LitPoint { sample, ref ray, ref place, .. } = *point;
@@ -360,14 +385,15 @@ impl<'a> Reception<'a> {
             effects.direct(bare, number, ray, rays, orientation, self.tilts)
         });
         paths.push(direct);
-        if !onward.is_empty() {
+        if onward.len() > 0 {
             let gain =
                 effects.map(|effects| effects.instrument_gain(number, ray, place.hit, orientation));
             let flux_w =
                 self.paths.link.flux_w(place.hit.cos_theta) * self.paths.lit_shares[sample];
             let flux_w = flux_w * gain.unwrap_or(1.0);
-            let second =
-                onward.iter().filter_map(|onward| self.second(point, flux_w, direct, onward));
+            let second = onward.filter_map(|(onward, second)| {
+                self.second_order(point, flux_w, direct, onward, second)
+            });
             paths.extend(second);
         }
     }
@@ -416,26 +442,27 @@ impl<'a> Reception<'a> {
     }
 
     /// The second-order path by way of a point that receives `flux_w`, W, and of a second surface; `None` without power.
-    fn second(&self, point: &LitPoint, flux_w: f64, direct: Path, onward: &Onward) -> Option<Path> {
-        let Onward { share, first, m, passage, ref place } = *onward;
-        let pattern = self.pattern(&place.hit);
-        let mut view = self.view_of_second(place, pattern.in_main_lobe);
-        // The beam's width counts once, here: exp(−ε²/4δ²) for the angle ε to its wavefront.
-        let beam_rad = view.beam_rad;
-        view.beam_rad = beam_rad.hypot(m);
-        let last = view.scattered(place);
+    fn second_order(
+        &self,
+        point: &LitPoint,
+        flux_w: f64,
+        direct: Path,
+        onward: &Onward,
+        second: &Second,
+    ) -> Option<Path> {
+        let Onward { share, first, passage, ref place, .. } = *onward;
+        let Second { ref view, gain, beam_share, seen: last } = *second;
         let specular_share = first.specular_share * last.specular_share;
-        let power_w = flux_w * share * pattern.gain * view.received_share(last);
+        let power_w = flux_w * share * gain * view.received_share(last);
         if power_w <= 0.0 {
             return None;
         }
-        let ways = [point.inward, passage, self.way_out(place, &view)?];
-        let polarised = self.polarised_share(specular_share, &[&point.place, place], &view, &ways);
+        let ways = [point.inward, passage, self.way_out(place, view)?];
+        let polarised = self.polarised_share(specular_share, &[&point.place, place], view, &ways);
         if polarised.share == 0.0 {
             return None;
         }
-        let coherent_share =
-            first.coherent_share * last.coherent_share * (beam_rad / view.beam_rad).powi(2);
+        let coherent_share = first.coherent_share * last.coherent_share * beam_share;
         let enhancement = self.enhancement(coherent_share);
         let delay_m = delay_m(&ways);
         let [a, b] = [&point.place, place].map(|place| self.piece(&place.hit));
@@ -495,28 +522,44 @@ impl<'a> Reception<'a> {
         way.hit.is_none().then_some(way.passage)
     }
 
-    /// How the antenna sees a second surface, over how it sees the spot. A separate receiver sees all alike.
-    fn pattern(&self, hit: &Hit) -> Pattern {
-        let Some(bounce) = &self.paths.light.setup.bounce else { return Pattern::EVEN };
-        match self.paths.observer {
-            Observer::Receiver { .. } => Pattern::EVEN,
-            Observer::Radar => {
+    /// Gain of the antenna towards a second surface, relative to that towards the spot, and whether that lies in the main lobe
+    /// of the radar's own beam. A separate receiver sees all alike.
+    fn gain(&self, hit: &Hit) -> (f64, bool) {
+        match (self.paths.observer, &self.paths.light.setup.bounce) {
+            (Observer::Radar, Some(bounce)) => {
                 let Spot { axis, beam, .. } = &self.chirp.spot;
                 let gain = bounce.pattern(beam, axis, self.chirp.rays, hit.point.xyz);
-                Pattern { gain, in_main_lobe: gain > bounce.outside_spot }
+                (gain, gain > bounce.outside_spot)
             }
+            _ => (1.0, false),
         }
     }
 }
 
 /// How an antenna sees a second surface.
-struct Pattern {
+struct Second {
+    view: View,
     /// Gain relative to that towards the spot.
     gain: f64,
-    /// Whether it lies in the main lobe of the radar's own beam.
-    in_main_lobe: bool,
+    /// Share of the square of the width, that of the beam and of a narrow first lobe together, that is the beam's.
+    beam_share: f64,
+    /// What it scatters towards the antenna.
+    seen: Seen,
 }
 
-impl Pattern {
-    const EVEN: Pattern = Pattern { gain: 1.0, in_main_lobe: false };
+/// A value for each of some things from their regions: `of_region` gives those of the things in its list, which all lie in one.
+fn by_region(
+    regions: impl Iterator<Item = usize>,
+    of_region: impl Fn(usize, &[usize]) -> Vec<Seen>,
+) -> Vec<Seen> {
+    let regions: Vec<usize> = regions.collect();
+    let mut places: Vec<usize> = (0..regions.len()).collect();
+    places.sort_by_key(|&place| regions[place]);
+    let mut all = vec![Seen::default(); regions.len()];
+    for here in places.chunk_by(|&a, &b| regions[a] == regions[b]) {
+        for (&place, seen) in here.iter().zip(of_region(regions[here[0]], here)) {
+            all[place] = seen;
+        }
+    }
+    all
 }

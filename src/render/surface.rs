@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::sheet::Sheet;
-use crate::brdf::{Retro, Scattering, Seen, widening_rad};
+use crate::brdf::{Bistatic, Pair, Retro, Scattering, Seen, widening_rad};
 use crate::frames::{Direction, Surface as Local};
 
 /// The surface of the facets of one region.
@@ -69,6 +69,18 @@ impl<'a> Surface<'a> {
             looks.iter_mut().for_each(|(beam_rad, _)| *beam_rad = self.widening_rad(*beam_rad));
             for (seen, f_per_sr) in seen.iter_mut().zip(retro.per_sr(&looks)) {
                 seen.f_per_sr = f_per_sr;
+            }
+        }
+        seen
+    }
+
+    /// What each pair of directions sees of it. `law` is its scattering model.
+    pub(super) fn seen_by_each(&self, law: &Bistatic, mut pairs: Vec<Pair>) -> Vec<Seen> {
+        let mut seen = law.seen(&pairs);
+        if self.seen_lobe_rad.is_some() {
+            pairs.iter_mut().for_each(|pair| pair.beam_rad = self.widening_rad(pair.beam_rad));
+            for (seen, widened) in seen.iter_mut().zip(law.seen(&pairs)) {
+                seen.f_per_sr = widened.f_per_sr;
             }
         }
         seen

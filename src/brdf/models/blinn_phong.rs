@@ -11,6 +11,7 @@ use std::f64::consts::TAU;
 use serde::{Deserialize, Serialize};
 
 use crate::brdf::backscatter::{Term, seen_cosines};
+use crate::brdf::bistatic::Lobe;
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::{Visitor, visit_number};
 use crate::brdf::scattering::{Scattering, ScatteringModel, Seen, half_vector};
@@ -32,6 +33,13 @@ pub struct BlinnPhong {
     pub alpha: f64,
 }
 
+impl BlinnPhong {
+    /// f at n·h = 1, 1/sr.
+    fn level_per_sr(&self) -> f64 {
+        self.r_s * (self.alpha + 2.0) / TAU
+    }
+}
+
 impl Scattering for BlinnPhong {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
         self.seen_by(0.0, i, o).f_per_sr
@@ -40,11 +48,15 @@ impl Scattering for BlinnPhong {
     fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
         let n_h = half_vector(i, o).cos_theta();
         let (alpha, share) = seen_cosines(self.alpha, beam_rad);
-        Seen::diffuse(self.r_s * (self.alpha + 2.0) / TAU * share * n_h.powf(alpha))
+        Seen::diffuse(self.level_per_sr() * share * n_h.powf(alpha))
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {
-        Some(vec![Term::diffuse(self.r_s * (self.alpha + 2.0) / TAU, self.alpha)])
+        Some(vec![Term::diffuse(self.level_per_sr(), self.alpha)])
+    }
+
+    fn lobes(&self) -> Option<Vec<Lobe>> {
+        Some(vec![Lobe::Cosines { level_per_sr: self.level_per_sr(), alpha: self.alpha }])
     }
 }
 

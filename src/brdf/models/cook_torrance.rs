@@ -15,6 +15,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::brdf::backscatter::{Facets, Term};
+use crate::brdf::bistatic::Lobe;
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::{Visitor, visit_number};
 use crate::brdf::scattering::{
@@ -141,6 +142,13 @@ impl Scattering for CookTorrance {
         let (m, distribution) = (self.m, self.distribution);
         let facets = Facets { m, distribution, shadowed, includes_beam: false };
         self.m_across.is_none().then(|| vec![Term::mirrors(self.f_lambda, facets)])
+    }
+
+    /// Without a grain, and with separable shadowing.
+    fn lobes(&self) -> Option<Vec<Lobe>> {
+        let CookTorrance { f_lambda, m, m_across, distribution, shadowing } = *self;
+        let has_lobe = m_across.is_none() && shadowing == Shadowing::Separable;
+        has_lobe.then(|| vec![Lobe::Facets { weight: 1.0, f_lambda, m, distribution }])
     }
 }
 

@@ -6,6 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::brdf::backscatter::Term;
+use crate::brdf::bistatic::Lobe;
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::{Visitor, visit_number};
 use crate::brdf::scattering::{Scattering, ScatteringModel};
@@ -32,6 +33,11 @@ impl Scattering for Lambert {
 
     fn backscatter(&self) -> Option<Vec<Term>> {
         Some(vec![Term::diffuse(self.albedo / std::f64::consts::PI, 0.0)])
+    }
+
+    fn lobes(&self) -> Option<Vec<Lobe>> {
+        let level_per_sr = self.albedo / std::f64::consts::PI;
+        Some(vec![Lobe::Cosines { level_per_sr, alpha: 0.0 }])
     }
 }
 

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::weighted;
 use crate::brdf::backscatter::Term;
+use crate::brdf::bistatic::Lobe;
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::{Visitor, visit_number};
 use crate::brdf::scattering::{NarrowLobe, Scattering, ScatteringModel, Seen};
@@ -78,6 +79,10 @@ impl<P: ScatteringModel> Scattering for Mixture<P> {
 
     fn backscatter(&self) -> Option<Vec<Term>> {
         weighted::backscatter(self.weighted())
+    }
+
+    fn lobes(&self) -> Option<Vec<Lobe>> {
+        weighted::lobes(self.weighted())
     }
 }
 

@@ -8,6 +8,7 @@ use num_complex::Complex;
 use serde::{Deserialize, Serialize};
 
 use super::backscatter::Term;
+use super::bistatic::Lobe;
 use super::kind::Kind;
 use super::parameter::{Parameter, ParameterError, Visitor};
 use super::scattering::{NarrowLobe, Scattering, ScatteringModel, Seen};
@@ -135,6 +136,10 @@ impl Scattering for Brdf {
 
     fn backscatter(&self) -> Option<Vec<Term>> {
         self.model().backscatter()
+    }
+
+    fn lobes(&self) -> Option<Vec<Lobe>> {
+        self.model().lobes()
     }
 }
 

@@ -8,6 +8,7 @@ use serde::{Deserialize, Deserializer, Serialize, de::Error};
 
 use super::weighted;
 use crate::brdf::backscatter::Term;
+use crate::brdf::bistatic::Lobe;
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::Visitor;
 use crate::brdf::scattering::{NarrowLobe, Scattering, ScatteringModel, Seen};
@@ -58,6 +59,10 @@ impl<P: ScatteringModel> Scattering for Sum<P> {
 
     fn backscatter(&self) -> Option<Vec<Term>> {
         weighted::backscatter(self.weighted())
+    }
+
+    fn lobes(&self) -> Option<Vec<Lobe>> {
+        weighted::lobes(self.weighted())
     }
 }
 

@@ -3,6 +3,7 @@
 use num_complex::Complex;
 
 use crate::brdf::backscatter::Term;
+use crate::brdf::bistatic::Lobe;
 use crate::brdf::scattering::{NarrowLobe, Scattering, Seen};
 use crate::brdf::slopes::VIEWING_RAD;
 use crate::frames::{Direction, Surface};
@@ -57,6 +58,17 @@ pub(super) fn narrow_lobes<'a, P: Scattering + 'a>(
         part.narrow_lobes(i).into_iter().map(weighted)
     });
     lobes.collect()
+}
+
+/// The lobes of the parts; `None` when one of them has no such sum.
+pub(super) fn lobes<'a, P: Scattering + 'a>(
+    parts: impl Iterator<Item = (f64, &'a P)>,
+) -> Option<Vec<Lobe>> {
+    let mut all = Vec::new();
+    for (weight, part) in parts {
+        all.extend(part.lobes()?.into_iter().map(|lobe| lobe.weighted(weight)));
+    }
+    Some(all)
 }
 
 /// The closed forms of the parts in backscatter; `None` when one of them has none.
