@@ -79,6 +79,14 @@ impl Trial<'_> {
         move_alike && own == other && few < many && more < many - few
     }
 
+    /// Whether this motion is so simple that a flexible one may only have found a way past an edge that it has not.
+    fn may_catch_up_with(&self, best: &Trial) -> bool {
+        let is_near = self.candidate.gain > SHARE_TO_CONTINUE * best.candidate.gain;
+        let move_alike = self.effect.moves() && best.effect.moves();
+        let is_simpler = self.candidate.numbers < best.candidate.numbers;
+        move_alike && is_simpler && is_near && !self.is_enough_for(best)
+    }
+
     /// Name and scans of its effect, which all members of a family share.
     fn key(&self) -> (&'static str, Vec<u16>) {
         (self.candidate.name, self.candidate.scans.clone())
@@ -131,14 +139,11 @@ impl<'p> Search<'p> {
         let hopeless = SHARE_OF_HOPE * largest.least_gain(true, shots);
         self.refit_shortlist(state, &mut trials, round, hopeless);
         sort(&mut trials);
-        let best = trials.first().map_or(0.0, |first| first.candidate.gain);
-        for (place, trial) in trials.iter_mut().enumerate() {
-            // A flexible motion may have found a way that a simple one has not.
-            let may_catch_up =
-                trial.effect.moves() && trial.candidate.gain > SHARE_TO_CONTINUE * best;
-            if place == 0 || may_catch_up {
-                self.continue_fit(state, trial, hopeless);
-            }
+        if let Some((first, others)) = trials.split_first_mut() {
+            others.iter_mut().filter(|other| other.may_catch_up_with(first)).for_each(|other| {
+                self.continue_fit(state, other, hopeless);
+            });
+            self.continue_fit(state, first, hopeless);
         }
         sort(&mut trials);
         trials
