@@ -104,7 +104,7 @@ fn goodness_of(residuals_db: &[f64], mut shares: Vec<f64>, speckle_db: Option<f6
     let z: Vec<f64> = shares.iter().map(|share| z_of(*share)).collect();
     let z_mean = mean(z.iter().copied());
     // Kolmogorov's distance of u from a uniform law.
-    shares.sort_by(f64::total_cmp);
+    shares.sort_unstable_by(f64::total_cmp);
     let count = shares.len() as f64;
     let mut ks_distance = 0.0f64;
     for (i, u) in shares.iter().enumerate() {

@@ -15,6 +15,7 @@ use rayon::prelude::*;
 
 use super::coordinates::Coordinates;
 use super::minimise::Local;
+use super::moments::{Moments, dot};
 use super::sensitivity::derivatives;
 use super::table::{Aspects, Place, Table};
 use crate::material::Observation;
@@ -36,8 +37,16 @@ pub(super) struct Deviations {
 pub(super) struct Squares<'a> {
     coordinates: &'a Coordinates,
     deviations: Deviations,
+    sums: Sums,
+}
+
+/// The detected rows, or all that counts of them.
+#[derive(Clone, Debug)]
+enum Sums {
+    /// Where angles are exact.
+    Moments(Moments),
     /// `None` for a censored row, which keeps its place so that the chunks of the sum do not change.
-    levels: Vec<Option<Level>>,
+    Levels(Vec<Option<Level>>),
 }
 
 /// A detected row.
@@ -57,19 +66,55 @@ impl<'a> Squares<'a> {
         rows: &[Observation],
         deviations: Deviations,
     ) -> Squares<'a> {
-        Squares { coordinates, deviations, levels: rows.iter().map(Level::new).collect() }
+        let levels: Vec<Option<Level>> = rows.iter().map(Level::new).collect();
+        let sums = if deviations.theta_sd_rad > 0.0 {
+            Sums::Levels(levels)
+        } else {
+            let reference = coordinates.table(&coordinates.start(), Aspects::knots());
+            let detected = levels.iter().flatten();
+            let levels = detected.map(|level| (&level.place, level.level_db / DB_PER_NEPER));
+            Sums::Moments(Moments::new(reference, levels))
+        };
+        Squares { coordinates, deviations, sums }
     }
 
     /// ½Σ of squared residuals of detected rows, scaled by the deviations.
     pub fn local(&self, at: &DVector<f64>) -> Local {
         let table = self.coordinates.table(at, Aspects::knots());
         let by_coordinate = derivatives(self.coordinates, at, Aspects::knots(), &table);
-        let parts: Vec<Local> = self
-            .levels
-            .par_chunks(CHUNK)
-            .map(|levels| self.sum_of(levels, &table, &by_coordinate))
-            .collect();
-        parts.into_iter().fold(Local::zero(at.len()), Local::merge)
+        match &self.sums {
+            Sums::Moments(moments) => self.sum_of_all(moments, &table, &by_coordinate),
+            Sums::Levels(levels) => {
+                let parts = levels.par_chunks(CHUNK);
+                let parts = parts.map(|levels| self.sum_of(levels, &table, &by_coordinate));
+                let parts: Vec<Local> = parts.collect();
+                parts.into_iter().fold(Local::zero(at.len()), Local::merge)
+            }
+        }
+    }
+
+    /// Of levels at exact angles.
+    fn sum_of_all(
+        &self,
+        moments: &Moments,
+        table: &Table,
+        by_coordinate: &[Option<Table>],
+    ) -> Local {
+        let scale = (DB_PER_NEPER / self.deviations.level_sd_db).powi(2);
+        let mut sum = Local::zero(by_coordinate.len());
+        sum.value = 0.5 * scale * moments.squares(table);
+        let slopes = moments.slopes(table);
+        for (row, by_row) in by_coordinate.iter().enumerate() {
+            let Some(by_row) = by_row else { continue };
+            sum.gradient[row] = scale * dot(&slopes, by_row.values());
+            let products = moments.times(by_row.values());
+            for (column, by_column) in by_coordinate.iter().enumerate() {
+                let product =
+                    by_column.as_ref().map_or(0.0, |other| dot(&products, other.values()));
+                sum.curvature[(row, column)] = scale * product;
+            }
+        }
+        sum
     }
 
     fn sum_of(

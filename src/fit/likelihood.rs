@@ -145,10 +145,10 @@ impl<'a> Likelihood<'a> {
                 let mut scratch = Scratch::new(unknowns);
                 for chirp in chunk {
                     sum.value -= chirp.score(tables, &mut scratch);
-                    sum.add(-1.0, 0.0, &scratch.score);
                     match curvature {
-                        Curvature::Scores => sum.add(0.0, 1.0, &scratch.score),
+                        Curvature::Scores => sum.add(-1.0, 1.0, &scratch.score),
                         Curvature::FromAfar => {
+                            sum.add(-1.0, 0.0, &scratch.score);
                             sum.add(0.0, scratch.bend, &scratch.gradient);
                             // Of the looks the products of the scores are all that is known.
                             for index in tables.looks() {
@@ -307,14 +307,12 @@ impl Chirp {
             let share = if self.noise > 0.0 { 1.0 - self.noise / ln_mean.exp() } else { 1.0 };
             laws.push((law, share));
         }
-        let largest = terms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        terms.iter_mut().for_each(|term| *term = (*term - largest).exp());
-        let sum: f64 = terms.iter().sum();
+        let sum_ln = shares_of(terms);
         gradient.fill(0.0);
         *bend = 0.0;
-        for ((Node { place, .. }, term), (law, share)) in self.nodes.iter().zip(&*terms).zip(&*laws)
+        for ((Node { place, .. }, &weight), (law, share)) in
+            self.nodes.iter().zip(&*terms).zip(&*laws)
         {
-            let weight = term / sum;
             if weight < 1e-9 {
                 continue;
             }
@@ -329,8 +327,20 @@ impl Chirp {
                 score[index] += factor * law.by_ln_mean * slope;
             }
         }
-        largest + sum.ln()
+        sum_ln
     }
+}
+
+/// Replaces each number by the share of its exponential in their sum, and returns ln of the sum.
+fn shares_of(terms: &mut [f64]) -> f64 {
+    if let [only] = terms {
+        return std::mem::replace(only, 1.0);
+    }
+    let largest = terms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    terms.iter_mut().for_each(|term| *term = (*term - largest).exp());
+    let sum: f64 = terms.iter().sum();
+    terms.iter_mut().for_each(|term| *term /= sum);
+    largest + sum.ln()
 }
 
 /// ln Σ exp.

@@ -29,10 +29,15 @@ impl Local {
 
     /// Adds `first`·j to the gradient and `second`·j·jᵀ to the curvature.
     pub fn add(&mut self, first: f64, second: f64, j: &[f64]) {
-        for (row, a) in j.iter().enumerate() {
-            self.gradient[row] += first * a;
-            for (column, b) in j.iter().enumerate() {
-                self.curvature[(row, column)] += second * a * b;
+        if first != 0.0 {
+            self.gradient.as_mut_slice().iter_mut().zip(j).for_each(|(sum, a)| *sum += first * a);
+        }
+        if second != 0.0 {
+            // The matrix is stored by columns, one after the other.
+            let columns = self.curvature.as_mut_slice().chunks_exact_mut(j.len().max(1));
+            for (column, a) in columns.zip(j) {
+                let by = second * a;
+                column.iter_mut().zip(j).for_each(|(sum, b)| *sum += by * b);
             }
         }
     }

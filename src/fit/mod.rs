@@ -32,6 +32,7 @@ mod least_squares;
 mod likelihood;
 pub(crate) mod minimise;
 mod models;
+mod moments;
 mod parts;
 mod projection;
 mod result;

@@ -96,7 +96,7 @@ fn covariance(coordinates: &Coordinates, found: &SearchResult) -> Vec<Vec<f64>> 
 
 /// Hash of the rows as numbers, with what they leave out.
 fn data_hash(rows: &[Observation]) -> String {
-    let mut hasher = blake3::Hasher::new();
+    let mut bytes = Vec::with_capacity(rows.len() * 48);
     for (row, index) in rows.iter().zip(0u32..) {
         let sigma0 = row.level_sigma0().unwrap_or(f64::NAN);
         for number in [
@@ -106,18 +106,18 @@ fn data_hash(rows: &[Observation]) -> String {
             sigma0,
             row.range_m.unwrap_or(0.0),
         ] {
-            hasher.update(&number.to_le_bytes());
+            bytes.extend(number.to_le_bytes());
         }
-        hasher.update(&row.chirp.unwrap_or(index).to_le_bytes());
-        hasher.update(&[u8::from(row.is_censored())]);
+        bytes.extend(row.chirp.unwrap_or(index).to_le_bytes());
+        bytes.push(u8::from(row.is_censored()));
         // Only where it is not backscatter, so that hashes of before stay.
         for angle_rad in [row.theta_r_rad, row.delta_phi_rad].iter().filter(|_| !row.is_retro()) {
-            hasher.update(&angle_rad.to_le_bytes());
+            bytes.extend(angle_rad.to_le_bytes());
         }
         // Only where a detection would not be there below it, so that hashes of before stay.
         if let Some(limit) = row.threshold_sigma0.filter(|_| !row.is_censored()) {
-            hasher.update(&limit.to_le_bytes());
+            bytes.extend(limit.to_le_bytes());
         }
     }
-    hasher.finalize().to_hex().to_string()
+    blake3::hash(&bytes).to_hex().to_string()
 }

@@ -56,7 +56,7 @@ impl Aspects {
         let (retro, mut pairs): (Vec<Aspect>, Vec<Aspect>) =
             aspects.iter().partition(|aspect| aspect.is_retro());
         let mut theta_rad: Vec<f64> = retro.iter().map(|aspect| aspect.theta_i_rad).collect();
-        theta_rad.sort_by(f64::total_cmp);
+        theta_rad.sort_unstable_by(f64::total_cmp);
         theta_rad.dedup_by(|a, b| a.total_cmp(b).is_eq());
         pairs.sort_by(Aspect::in_order);
         pairs.dedup_by(|a, b| a.in_order(b).is_eq());
@@ -164,6 +164,11 @@ impl Place {
     fn exact(index: usize) -> Place {
         let knots = [index as u32; 4];
         Place { knots, weights: [1.0, 0.0, 0.0, 0.0], slopes_per_rad: [0.0; 4] }
+    }
+
+    /// The knots around it with their weights.
+    pub fn terms(&self) -> impl Iterator<Item = (usize, f64)> + use<> {
+        self.knots.map(|knot| knot as usize).into_iter().zip(self.weights)
     }
 
     /// The place of an angle. Negative angles are mirrored, and angles beyond the last knot are clamped to it.

@@ -79,7 +79,8 @@ pub struct Detection {
 #[derive(Clone)]
 pub struct RangeProcessor {
     transmitter: Transmitter,
-    window: Vec<f64>,
+    /// The window's samples over their sum.
+    weights: Vec<f64>,
     transform: Arc<dyn Fft<f64>>,
     bin_m: f64,
     resolution_m: f64,
@@ -166,12 +167,13 @@ impl RangeProcessor {
             }
         };
         let Receiver { leakage, phase_noise, sweep_ripple, .. } = *receiver;
+        let gain: f64 = window.iter().sum();
         Ok(RangeProcessor {
             transmitter: Transmitter::new(*chirp, leakage, phase_noise, sweep_ripple),
             transform: FftPlanner::new().plan_fft_forward(length),
             resolution_m: receiver.window.half_power_width_bins() * chirp.range_resolution_m(),
             noise_per_sample_w: density_w_per_hz * chirp.sample_rate_hz(),
-            window,
+            weights: window.into_iter().map(|sample| sample / gain).collect(),
             bin_m,
             gate_bins,
             noise_per_bin_w,
@@ -229,13 +231,14 @@ impl RangeProcessor {
 
     /// The spectrum over range, √W, whose squares are [`profile_w`](Self::profile_w).
     pub fn spectrum(&self, signal: &[Complex<f64>]) -> Vec<Complex<f64>> {
-        let mut spectrum = vec![Complex::ZERO; self.transform.len()];
-        for (bin, (sample, weight)) in spectrum.iter_mut().zip(signal.iter().zip(&self.window)) {
+        let silence = |count: usize| vec![Complex::ZERO; count];
+        let mut windowed = silence(self.transform.len());
+        for (bin, (sample, weight)) in windowed.iter_mut().zip(signal.iter().zip(&self.weights)) {
             *bin = sample * weight;
         }
-        self.transform.process(&mut spectrum);
-        let gain: f64 = self.window.iter().sum();
-        spectrum.iter_mut().for_each(|x| *x /= gain);
+        let mut spectrum = silence(windowed.len());
+        let mut scratch = silence(self.transform.get_outofplace_scratch_len());
+        self.transform.process_outofplace_with_scratch(&mut windowed, &mut spectrum, &mut scratch);
         spectrum
     }
 
@@ -244,7 +247,7 @@ impl RangeProcessor {
     /// Samples count from the start of the sweep, half a turn before its middle for every natural bin of range.
     pub fn phase_rad(&self, spectrum: &[Complex<f64>], range_m: f64) -> f64 {
         let bin = (range_m / self.bin_m).round().max(0.0) as usize;
-        let natural = bin as f64 * self.window.len() as f64 / spectrum.len() as f64;
+        let natural = bin as f64 * self.weights.len() as f64 / spectrum.len() as f64;
         let start = Complex::cis(std::f64::consts::PI * natural);
         spectrum.get(bin).map_or(0.0, |at_peak| (at_peak * start).arg())
     }

@@ -42,9 +42,12 @@ impl Signal {
 
     /// Its samples.
     pub fn samples(&self) -> Vec<Complex<f64>> {
-        let blocks = self.blocks.iter();
-        let samples = blocks.flat_map(|[re, im]| re.iter().zip(im));
-        samples.take(self.samples).map(|(&re, &im)| Complex::new(re, im)).collect()
+        let mut samples = Vec::with_capacity(LANES * self.blocks.len());
+        for [re, im] in &self.blocks {
+            samples.extend(re.iter().zip(im).map(|(&re, &im)| Complex::new(re, im)));
+        }
+        samples.truncate(self.samples);
+        samples
     }
 }
 
