@@ -5,9 +5,11 @@
 //! m = 0.001 has as many as a broad one.
 
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::sync::LazyLock;
 
 use rayon::prelude::*;
 
+use super::bistatic::{Bistatic, Pair};
 use super::models::Brdf;
 use super::scattering::Scattering;
 use crate::frames::{Direction, Surface};
@@ -71,25 +73,35 @@ pub fn incidences_rad([low_rad, high_rad]: [f64; 2]) -> Vec<f64> {
 /// What a law reflects at an incidence, rad, in all directions, over what it receives.
 pub fn albedo(law: &dyn Scattering, theta_rad: f64) -> f64 {
     let i = Direction::from_angles(theta_rad, 0.0);
-    let mut sum = 0.0;
+    let (mut pairs, mut weights) = (Vec::new(), Vec::new());
+    for (h, solid_angle_sr) in &*HALF_VECTORS {
+        let i_h = i.xyz().dot(h.xyz());
+        let Some(o) = Direction::new(2.0 * i_h * h.xyz() - i.xyz()) else { continue };
+        if i_h > 0.0 && o.cos_theta() > 0.0 {
+            pairs.push(Pair { beam_rad: 0.0, i, o });
+            weights.push(4.0 * i_h * solid_angle_sr * o.cos_theta());
+        }
+    }
+    let seen = Bistatic::new(law).seen(&pairs);
+    2.0 * seen.iter().zip(weights).map(|(seen, weight)| seen.f_per_sr * weight).sum::<f64>()
+}
+
+/// The nodes of the integral, half vectors and their solid angles, sr.
+static HALF_VECTORS: LazyLock<Vec<(Direction<Surface>, f64)>> = LazyLock::new(|| {
+    let mut nodes = Vec::new();
     for node in 0..NODES.0 {
         let x = (f64::from(node) + 0.5) / f64::from(NODES.0);
         let stretch = FRAC_PI_2 / GAMMA.exp_m1();
-        let theta_h = stretch * (GAMMA * x).exp_m1();
+        let theta_rad = stretch * (GAMMA * x).exp_m1();
         let d_theta = stretch * GAMMA * (GAMMA * x).exp() / f64::from(NODES.0);
-        for turn in 0..NODES.1 {
-            let d_azimuth = PI / f64::from(NODES.1);
-            let h = Direction::<Surface>::from_angles(theta_h, (f64::from(turn) + 0.5) * d_azimuth);
-            let i_h = i.xyz().dot(h.xyz());
-            let Some(o) = Direction::new(2.0 * i_h * h.xyz() - i.xyz()) else { continue };
-            if i_h > 0.0 && o.cos_theta() > 0.0 {
-                let solid_angle_sr = 4.0 * i_h * theta_h.sin() * d_theta * d_azimuth;
-                sum += law.f_per_sr(i, o) * o.cos_theta() * solid_angle_sr;
-            }
-        }
+        let d_azimuth = PI / f64::from(NODES.1);
+        nodes.extend((0..NODES.1).map(|turn| {
+            let h = Direction::from_angles(theta_rad, (f64::from(turn) + 0.5) * d_azimuth);
+            (h, theta_rad.sin() * d_theta * d_azimuth)
+        }));
     }
-    2.0 * sum
-}
+    nodes
+});
 
 /// The most that a law can reflect, by its parameters alone; infinite where they do not say it.
 fn most(law: &Brdf) -> f64 {

@@ -50,12 +50,15 @@ pub(super) fn goodness(
         let below = Likelihood::new(coordinates, rows, noise_w).ln_below(at);
         let censored: Vec<bool> = rows.iter().map(Observation::is_censored).collect();
         let speckle_db = standard_deviation_db(coordinates.looks(at));
-        return goodness_of(&residuals_db, shares(&below, &censored, fit.seed), Some(speckle_db));
+        let shares = shares(&below, &censored, fit.seed);
+        let z: Vec<f64> = shares.iter().map(|share| z_of(*share)).collect();
+        return goodness_of(&residuals_db, shares, &z, Some(speckle_db));
     }
     let squares: f64 = residuals_db.iter().map(|r| r * r).sum();
     let rms_db = (squares / residuals_db.len().max(1) as f64).sqrt().max(f64::MIN_POSITIVE);
-    let shares = residuals_db.iter().map(|r| normal_share(r / rms_db)).collect();
-    goodness_of(&residuals_db, shares, None)
+    let z: Vec<f64> = residuals_db.iter().map(|residual_db| residual_db / rms_db).collect();
+    let shares = z.iter().map(|z| normal_share(*z)).collect();
+    goodness_of(&residuals_db, shares, &z, None)
 }
 
 /// Probabilities u of rows from ln of the probability below each; those of censored rows are drawn.
@@ -99,9 +102,14 @@ fn z_of(share: f64) -> f64 {
     -std::f64::consts::SQRT_2 * erfc_inv(2.0 * share.clamp(1e-15, 1.0 - 1e-15))
 }
 
-/// Sums up residuals in dB and probabilities u; `speckle_db` is the standard deviation that speckle alone leaves.
-fn goodness_of(residuals_db: &[f64], mut shares: Vec<f64>, speckle_db: Option<f64>) -> Goodness {
-    let z: Vec<f64> = shares.iter().map(|share| z_of(*share)).collect();
+/// Sums up residuals in dB, probabilities u and their normal numbers; `speckle_db` is the standard deviation that speckle alone
+/// leaves.
+fn goodness_of(
+    residuals_db: &[f64],
+    mut shares: Vec<f64>,
+    z: &[f64],
+    speckle_db: Option<f64>,
+) -> Goodness {
     let z_mean = mean(z.iter().copied());
     // Kolmogorov's distance of u from a uniform law.
     shares.sort_unstable_by(f64::total_cmp);
@@ -134,7 +142,8 @@ mod tests {
     fn a_uniform_law_is_found_uniform() {
         let ln_below: Vec<f64> = (0..2000).map(|i| ((f64::from(i) + 0.5) / 2000.0).ln()).collect();
         let shares = shares(&ln_below, &[false; 2000], 1);
-        let goodness = goodness_of(&[1.0, -1.0], shares, None);
+        let z: Vec<f64> = shares.iter().map(|share| z_of(*share)).collect();
+        let goodness = goodness_of(&[1.0, -1.0], shares, &z, None);
         assert!(goodness.z_mean.abs() < 1e-6 && (goodness.z_variance - 1.0).abs() < 5e-3);
         assert!(goodness.ks_distance < 1e-3 && goodness.rms_db == 1.0 && goodness.mean_db == 0.0);
     }
@@ -145,7 +154,7 @@ mod tests {
         let censored: Vec<bool> = (0..4000).map(|i| i % 2 == 0).collect();
         let u = |i: usize| if censored[i] { 0.5 } else { 0.5 + i as f64 / 8000.0 };
         let ln_below: Vec<f64> = (0..4000).map(|i| u(i).ln()).collect();
-        let goodness = goodness_of(&[], shares(&ln_below, &censored, 7), None);
+        let goodness = goodness_of(&[], shares(&ln_below, &censored, 7), &[], None);
         assert!(goodness.ks_distance < 1.95 / 4000f64.sqrt(), "{goodness:?}");
     }
 
