@@ -6,51 +6,11 @@
 use std::f64::consts::PI;
 
 use super::backscatter::seen_cosines;
+use super::lobe::Lobe;
 use super::scattering::{NARROW_M, Scattering, Seen};
 use super::slopes::{self, Distribution, SLOPE_NODES};
 use crate::frames::{Direction, Surface};
 use crate::lanes::{Wide, exp, ln, widest};
-
-/// One lobe of a law.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Lobe {
-    /// A diffuse one, level·(n·h)^α.
-    Cosines {
-        /// Its level, 1/sr.
-        level_per_sr: f64,
-        /// Exponent α.
-        alpha: f64,
-    },
-    /// Facets that reflect like mirrors, weight·F·D·G1(i)·G1(o)/(4·cos θ_i·cos θ_o), with Schlick's F.
-    Facets {
-        /// Its weight in the law.
-        weight: f64,
-        /// Reflectivity at normal incidence.
-        f_lambda: f64,
-        /// Roughness m.
-        m: f64,
-        /// Law of the slopes.
-        distribution: Distribution,
-    },
-}
-
-impl Lobe {
-    /// The lobe with this weight in a law.
-    pub(super) fn weighted(self, by: f64) -> Lobe {
-        match self {
-            Lobe::Cosines { level_per_sr, alpha } => {
-                Lobe::Cosines { level_per_sr: by * level_per_sr, alpha }
-            }
-            Lobe::Facets { weight, f_lambda, m, distribution } => {
-                Lobe::Facets { weight: by * weight, f_lambda, m, distribution }
-            }
-        }
-    }
-
-    fn is_narrow(&self) -> bool {
-        matches!(self, Lobe::Facets { m, .. } if *m <= NARROW_M)
-    }
-}
 
 /// A look at a surface that is lit from another direction.
 #[derive(Clone, Copy, Debug)]
@@ -76,13 +36,14 @@ impl<'a> Bistatic<'a> {
 
     /// What each pair sees.
     pub(crate) fn seen(&self, pairs: &[Pair]) -> Vec<Seen> {
-        let alone = |pair: &Pair| self.law.seen_by(pair.beam_rad, pair.i, pair.o);
-        let Some(lobes) = &self.lobes else { return pairs.iter().map(alone).collect() };
+        let Some(lobes) = &self.lobes else {
+            return pairs.iter().map(|pair| self.alone(pair)).collect();
+        };
         let mut seen = sums(lobes.iter(), pairs);
         // In backscatter GGX's law has a closed form through a beam as well (`slopes.rs`).
         for (seen, pair) in seen.iter_mut().zip(pairs) {
             if pair.i == pair.o {
-                *seen = alone(pair);
+                *seen = self.alone(pair);
             }
         }
         seen
@@ -91,13 +52,22 @@ impl<'a> Bistatic<'a> {
     /// What each pair sees apart from narrow lobes, without a beam.
     pub(crate) fn apart_from_narrow_lobes(&self, pairs: &[Pair]) -> Vec<Seen> {
         match &self.lobes {
-            Some(lobes) => sums(lobes.iter().filter(|lobe| !lobe.is_narrow()), pairs),
+            Some(lobes) => sums(lobes.iter().filter(|lobe| !is_narrow(lobe)), pairs),
             None => {
-                let alone = |pair: &Pair| self.law.apart_from_narrow_lobes(pair.i, pair.o);
-                pairs.iter().map(alone).collect()
+                let pairs = pairs.iter();
+                pairs.map(|pair| self.law.apart_from_narrow_lobes(pair.i, pair.o)).collect()
             }
         }
     }
+
+    /// What one pair sees, by the law itself.
+    fn alone(&self, &Pair { beam_rad, i, o }: &Pair) -> Seen {
+        self.law.seen_by(beam_rad, i, o)
+    }
+}
+
+fn is_narrow(lobe: &Lobe) -> bool {
+    matches!(lobe, Lobe::Facets { m, .. } if *m <= NARROW_M)
 }
 
 fn sums<'a>(lobes: impl Iterator<Item = &'a Lobe> + Clone, pairs: &[Pair]) -> Vec<Seen> {
@@ -138,8 +108,8 @@ impl<'a, L: Iterator<Item = &'a Lobe> + Clone> Wide for Sums<'_, L> {
             }
             let parts = all.iter().zip(specular.iter().zip(&coherent)).take(pairs.len());
             self.seen.extend(parts.map(|(&f_per_sr, (specular, coherent))| {
-                let share = |part: &f64| if f_per_sr > 0.0 { part / f_per_sr } else { 0.0 };
-                let [specular_share, coherent_share] = [share(specular), share(coherent)];
+                let [specular_share, coherent_share] = [specular, coherent]
+                    .map(|part| if f_per_sr > 0.0 { part / f_per_sr } else { 0.0 });
                 Seen { f_per_sr, specular_share, coherent_share }
             }));
         }

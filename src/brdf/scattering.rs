@@ -3,7 +3,7 @@
 use num_complex::Complex;
 
 use super::backscatter::Term;
-use super::bistatic::Lobe;
+use super::lobe::Lobe;
 use super::parameter::Visitor;
 use super::validity::Condition;
 use crate::frames::{Direction, Surface};

@@ -231,13 +231,12 @@ impl RangeProcessor {
 
     /// The spectrum over range, √W, whose squares are [`profile_w`](Self::profile_w).
     pub fn spectrum(&self, signal: &[Complex<f64>]) -> Vec<Complex<f64>> {
-        let silence = |count: usize| vec![Complex::ZERO; count];
-        let mut windowed = silence(self.transform.len());
+        let mut windowed = vec![Complex::ZERO; self.transform.len()];
         for (bin, (sample, weight)) in windowed.iter_mut().zip(signal.iter().zip(&self.weights)) {
             *bin = sample * weight;
         }
-        let mut spectrum = silence(windowed.len());
-        let mut scratch = silence(self.transform.get_outofplace_scratch_len());
+        let mut spectrum = vec![Complex::ZERO; windowed.len()];
+        let mut scratch = vec![Complex::ZERO; self.transform.get_outofplace_scratch_len()];
         self.transform.process_outofplace_with_scratch(&mut windowed, &mut spectrum, &mut scratch);
         spectrum
     }

@@ -127,21 +127,22 @@ impl<'a> Light<'a> {
     ) {
         for (sample, hit) in hits.iter().enumerate() {
             let Some((hit, ray)) = hit.zip(spot.ray(self.samples[sample])) else { continue };
-            let lit = |hit: Hit, inward: Passage| {
-                let place = self.place(hit, -ray.direction.xyz());
-                LitPoint { sample, ray, place, inward, onward: 0..0 }
-            };
-            points.push(lit(hit, Passage::FREE));
+            points.push(self.lit(sample, ray, hit, Passage::FREE));
             // Behind every sheet that the ray meets lies something else, or nothing.
             let (mut front, mut inward) = (hit, Passage::FREE);
             for behind in &self.footprints.behind {
                 let Some(sheet) = self.setup.sheet(front.facet) else { break };
                 let Some(hit) = behind.hits[number * hits.len() + sample] else { break };
                 inward = inward.then(passage(self.setup, sheet, &front, ray.direction));
-                points.push(lit(hit, inward));
+                points.push(self.lit(sample, ray, hit, inward));
                 front = hit;
             }
         }
+    }
+
+    fn lit(&self, sample: usize, ray: Ray<Global>, hit: Hit, inward: Passage) -> LitPoint<'a> {
+        let place = self.place(hit, -ray.direction.xyz());
+        LitPoint { sample, ray, place, inward, onward: 0..0 }
     }
 
     /// Appends the second surfaces of all points.
@@ -171,25 +172,22 @@ impl<'a> Light<'a> {
         onward: &mut Vec<Onward<'a>>,
     ) {
         let from = &point.place;
-        let mut send = |direction, share, first, m| {
-            if share <= 0.0 {
-                return;
-            }
+        let drawn = directions(from.source, bounce.rays, key);
+        let pairs = drawn.iter().map(|&(o, _)| Pair { beam_rad: 0.0, i: from.source, o });
+        let law = &self.laws[self.region(&from.hit)];
+        let scattered = law.apart_from_narrow_lobes(&pairs.collect::<Vec<_>>());
+        let drawn = drawn.into_iter().zip(scattered).map(|((direction, weight), first)| {
+            (direction, first.f_per_sr * direction.cos_theta() * weight, first, 0.0)
+        });
+        let narrow = from.surface.scattering.narrow_lobes(from.source).into_iter();
+        let mirrored = from.source.mirrored();
+        let narrow = narrow.map(|NarrowLobe { share, m }| (mirrored, share, Seen::mirror(0.0), m));
+        for (direction, share, first, m) in drawn.chain(narrow).filter(|sent| sent.1 > 0.0) {
             let way = self.follow(from, direction, f64::INFINITY);
             if let Some(Way { hit: Some(hit), passage }) = way {
                 let place = self.place(hit, -from.frame.world(direction.xyz()));
                 onward.push(Onward { share, first, m, passage, place });
             }
-        };
-        let drawn = directions(from.source, bounce.rays, key);
-        let pairs = drawn.iter().map(|&(o, _)| Pair { beam_rad: 0.0, i: from.source, o });
-        let law = &self.laws[self.region(&from.hit)];
-        let scattered = law.apart_from_narrow_lobes(&pairs.collect::<Vec<_>>());
-        for (&(direction, weight), first) in drawn.iter().zip(scattered) {
-            send(direction, first.f_per_sr * direction.cos_theta() * weight, first, 0.0);
-        }
-        for NarrowLobe { share, m } in from.surface.scattering.narrow_lobes(from.source) {
-            send(from.source.mirrored(), share, Seen::mirror(0.0), m);
         }
     }
 

@@ -11,8 +11,8 @@ use std::f64::consts::TAU;
 use serde::{Deserialize, Serialize};
 
 use crate::brdf::backscatter::{Term, seen_cosines};
-use crate::brdf::bistatic::Lobe;
 use crate::brdf::kind::{Key, Kind};
+use crate::brdf::lobe::Lobe;
 use crate::brdf::parameter::{Visitor, visit_number};
 use crate::brdf::scattering::{Scattering, ScatteringModel, Seen, half_vector};
 use crate::frames::{Direction, Surface};

@@ -15,8 +15,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::brdf::backscatter::{Facets, Term};
-use crate::brdf::bistatic::Lobe;
 use crate::brdf::kind::{Key, Kind};
+use crate::brdf::lobe::Lobe;
 use crate::brdf::parameter::{Visitor, visit_number};
 use crate::brdf::scattering::{
     NARROW_M, NarrowLobe, Scattering, ScatteringModel, Seen, half_vector,

@@ -6,8 +6,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::brdf::backscatter::Term;
-use crate::brdf::bistatic::Lobe;
 use crate::brdf::kind::{Key, Kind};
+use crate::brdf::lobe::Lobe;
 use crate::brdf::parameter::{Visitor, visit_number};
 use crate::brdf::scattering::{Scattering, ScatteringModel};
 use crate::frames::{Direction, Surface};

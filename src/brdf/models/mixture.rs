@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use super::weighted;
 use crate::brdf::backscatter::Term;
-use crate::brdf::bistatic::Lobe;
 use crate::brdf::kind::{Key, Kind};
+use crate::brdf::lobe::Lobe;
 use crate::brdf::parameter::{Visitor, visit_number};
 use crate::brdf::scattering::{NarrowLobe, Scattering, ScatteringModel, Seen};
 use crate::frames::{Direction, Surface};

@@ -8,8 +8,8 @@ use num_complex::Complex;
 use serde::{Deserialize, Serialize};
 
 use super::backscatter::Term;
-use super::bistatic::Lobe;
 use super::kind::Kind;
+use super::lobe::Lobe;
 use super::parameter::{Parameter, ParameterError, Visitor};
 use super::scattering::{NarrowLobe, Scattering, ScatteringModel, Seen};
 use super::validity::Condition;

@@ -8,8 +8,8 @@ use serde::{Deserialize, Deserializer, Serialize, de::Error};
 
 use super::weighted;
 use crate::brdf::backscatter::Term;
-use crate::brdf::bistatic::Lobe;
 use crate::brdf::kind::{Key, Kind};
+use crate::brdf::lobe::Lobe;
 use crate::brdf::parameter::Visitor;
 use crate::brdf::scattering::{NarrowLobe, Scattering, ScatteringModel, Seen};
 use crate::frames::{Direction, Surface};

@@ -3,7 +3,7 @@
 use num_complex::Complex;
 
 use crate::brdf::backscatter::Term;
-use crate::brdf::bistatic::Lobe;
+use crate::brdf::lobe::Lobe;
 use crate::brdf::scattering::{NarrowLobe, Scattering, Seen};
 use crate::brdf::slopes::VIEWING_RAD;
 use crate::frames::{Direction, Surface};
