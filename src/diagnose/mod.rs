@@ -67,6 +67,7 @@ mod subject;
 mod support;
 #[cfg(test)]
 mod tests;
+mod told;
 mod trial;
 mod unresolved;
 mod views;

@@ -11,6 +11,7 @@ use super::folds::Folds;
 use super::likelihood::Term;
 use super::problem::{EFFECT_STEP, Problem, Slope};
 use super::space::Space;
+use super::told;
 use crate::fit::minimise::{Local, Minimise, Stop};
 use crate::fit::shapes;
 use crate::fit::uncertainty::deviations;
@@ -209,15 +210,11 @@ impl Problem<'_> {
             |whole: DMatrix<f64>| (whole + &beside).select_rows(&free).select_columns(&free);
         let of_cells = of_free(products_of_cells(&slopes, folds));
         let of_shots = of_free(products(&terms, [&slopes, &slopes]));
-        let of_model = deviations(&of_shots);
-        let mut told = of_model.clone();
+        let mut told = deviations(&of_shots);
         if !space.moving().is_empty() {
-            // Facets that move under the rays change ln p by steps, which slopes over another width do not share. They would
-            // tell how a ball is turned.
             let wide = self.slopes_over(WIDE_TO_NARROW[0], space, at, [&lower, &upper], &terms);
             let both = of_free(products(&terms, [&slopes, &wide]));
-            let of_both = deviations(&(0.5 * (&both + both.transpose())));
-            told = of_both.iter().zip(&of_model).map(told_by_both).collect();
+            told = told::deviations(&of_shots, &both);
         }
         let inverse = of_shots.try_inverse().map(|inverse| &inverse * of_cells * &inverse);
         let mut sd = vec![f64::INFINITY; at.len()];
@@ -246,14 +243,6 @@ fn products(terms: &[Term], [one, other]: [&[Vec<Slope>]; 2]) -> DMatrix<f64> {
         });
         products.sum()
     })
-}
-
-/// Standard deviation of an unknown by what slopes over two widths share, where that tells it nearly as well as those of one
-/// seem to.
-fn told_by_both((both, one): (&Option<f64>, &Option<f64>)) -> Option<f64> {
-    const WIDER: f64 = 3.0;
-    let (both, one) = both.zip(*one)?;
-    (both < WIDER * one).then_some(both.max(one))
 }
 
 /// Sum of the products of the cells' scores.

@@ -59,11 +59,11 @@ pub(super) struct HeldOut {
 
 impl Scorer<'_> {
     /// ln likelihood, less what speaks against the point of the fit and Schwarz's penalty for every number of the effects (Ann.
-    /// Stat. 6 (1978) 461). It compares models that predict equally well.
+    /// Stat. 6 (1978) 461), of as many observations as patches are held out. It compares models that predict equally well.
     pub fn worth(&self, state: &State) -> f64 {
         let State { space, fit, .. } = state;
         let numbers = (fit.at.len() - space.base_len()) as f64;
-        let penalty = 0.5 * numbers * self.problem.independent_shots().max(1.0).ln();
+        let penalty = 0.5 * numbers * (self.folds.blocks.max(1) as f64).ln();
         fit.ln_likelihood - space.against(&fit.at) - penalty
     }
 

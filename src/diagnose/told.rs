@@ -1,0 +1,91 @@
+//! Which unknowns the data tell where facets move under the rays.
+//!
+//! ln p then changes by steps, and its slopes over one width seem to tell how a ball is turned. Slopes over another width do not
+//! share those steps: along a direction that the data do tell, the products of both are those of one. An unknown with
+//! a part in another direction is told no better than that direction is, which is not at all.
+
+use nalgebra::DMatrix;
+
+/// Share of the products of one width that those of both must keep along a direction which the data tell.
+const KEPT: f64 = 1.0 / 9.0;
+/// Share of the variance of an unknown that may lie along other directions, as one width tells them.
+const UNTOLD: f64 = 0.02;
+/// Least eigenvalue of the scaled products of a direction that one width tells.
+const LEAST: f64 = 1e-6;
+
+/// Standard deviations from the products of the scores, by slopes of one width and of two; none for an unknown that the data
+/// do not tell.
+pub(super) fn deviations(one: &DMatrix<f64>, both: &DMatrix<f64>) -> Vec<Option<f64>> {
+    let scale: Vec<f64> = one.diagonal().iter().map(|bend| bend.max(0.0).sqrt()).collect();
+    let bent: Vec<usize> = (0..scale.len()).filter(|&k| scale[k] > 0.0).collect();
+    let scaled = |products: &DMatrix<f64>| {
+        DMatrix::from_fn(bent.len(), bent.len(), |a, b| {
+            let (a, b) = (bent[a], bent[b]);
+            0.5 * (products[(a, b)] + products[(b, a)]) / (scale[a] * scale[b])
+        })
+    };
+    let (of_one, of_both) = (scaled(one).symmetric_eigen(), scaled(both));
+    let seen: Vec<usize> = (0..bent.len()).filter(|&k| of_one.eigenvalues[k] > LEAST).collect();
+    // Directions along which the products of one width are 1.
+    let whitening = DMatrix::from_fn(bent.len(), seen.len(), |row, column| {
+        let k = seen[column];
+        of_one.eigenvectors[(row, k)] / of_one.eigenvalues[k].sqrt()
+    });
+    let kept = (whitening.transpose() * of_both * &whitening).symmetric_eigen();
+    let directions = whitening * &kept.eigenvectors;
+    let mut deviations = vec![None; scale.len()];
+    for (place, &k) in bent.iter().enumerate() {
+        let hidden = (0..bent.len()).filter(|k| !seen.contains(k));
+        let mut untold: f64 = hidden.map(|k| of_one.eigenvectors[(place, k)].powi(2) / LEAST).sum();
+        let mut variance = 0.0;
+        for (part, share) in directions.row(place).iter().zip(&kept.eigenvalues) {
+            if *share > KEPT {
+                variance += part * part / share.min(1.0);
+            } else {
+                untold += part * part;
+            }
+        }
+        if untold <= UNTOLD * variance {
+            deviations[k] = Some(variance.sqrt() / scale[k]);
+        }
+    }
+    deviations
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_both_widths_share_is_told() {
+        let one = DMatrix::from_row_slice(2, 2, &[4.0, 0.0, 0.0, 100.0]);
+        let found = deviations(&one, &one);
+        assert!((found[0].unwrap() - 0.5).abs() < 1e-12 && (found[1].unwrap() - 0.1).abs() < 1e-12);
+        let found = deviations(&one, &(0.25 * &one));
+        assert!((found[0].unwrap() - 1.0).abs() < 1e-12, "{found:?}");
+    }
+
+    #[test]
+    fn a_shift_that_makes_up_for_an_untold_turn_is_not_told_either() {
+        // A ball that turns about a point beside its centre: steps of its facets tell the turn by one width alone, and what is
+        // told is the shift of the centre, x + turn.
+        let of_centre =
+            DMatrix::from_row_slice(3, 3, &[9.0, 9.0, 0.0, 9.0, 9.0, 0.0, 0.0, 0.0, 4.0]);
+        let mut one = of_centre.clone();
+        one[(1, 1)] += 25.0;
+        let found = deviations(&one, &of_centre);
+        assert_eq!(found[..2], [None, None]);
+        assert!((found[2].unwrap() - 0.5).abs() < 1e-9);
+        // Where the turn is told, so is the shift.
+        assert!(deviations(&one, &one).iter().all(Option::is_some));
+    }
+
+    #[test]
+    fn an_unknown_without_slopes_is_not_told() {
+        let one = DMatrix::from_row_slice(2, 2, &[4.0, 0.0, 0.0, 0.0]);
+        assert_eq!(deviations(&one, &one), [Some(0.5), None]);
+        // Nor is one that only acts together with another.
+        let same = DMatrix::from_element(2, 2, 3.0);
+        assert_eq!(deviations(&same, &same), [None, None]);
+    }
+}
