@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 /// Share of the products of one width that those of both must keep along a direction which the data tell.
 const KEPT: f64 = 1.0 / 9.0;
 /// Share of the variance of an unknown that may lie along other directions, as one width tells them.
-const UNTOLD: f64 = 0.02;
+const UNTOLD: f64 = 0.2;
 /// Least eigenvalue of the scaled products of a direction that one width tells.
 const LEAST: f64 = 1e-6;
 
@@ -46,7 +46,8 @@ pub(super) fn deviations(one: &DMatrix<f64>, both: &DMatrix<f64>) -> Vec<Option<
             }
         }
         if untold <= UNTOLD * variance {
-            deviations[k] = Some(variance.sqrt() / scale[k]);
+            // A small part along another direction counts as if that were told by the least that is.
+            deviations[k] = Some((variance + untold / KEPT).sqrt() / scale[k]);
         }
     }
     deviations
