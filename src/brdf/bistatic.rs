@@ -191,10 +191,10 @@ impl Angles {
     #[inline(always)]
     fn of_cosines(&self, level_per_sr: f64, alpha: f64) -> Numbers {
         let mut part = [0.0; PAIRS];
-        for lane in 0..PAIRS {
+        for (lane, part) in part.iter_mut().enumerate() {
             let (alpha, share) = seen_cosines(alpha, self.beam_rad[lane]);
             let lobe = level_per_sr * share * exp(alpha * ln(self.n_h[lane]));
-            part[lane] = if self.is_above_horizon(lane) { lobe } else { 0.0 };
+            *part = if self.is_above_horizon(lane) { lobe } else { 0.0 };
         }
         part
     }
@@ -228,8 +228,8 @@ impl Angles {
     #[inline(always)]
     fn beckmann(&self, m: f64) -> Numbers {
         let mut density = [0.0; PAIRS];
-        for lane in 0..PAIRS {
-            density[lane] = self.gaussian(lane, m * m)[1];
+        for (lane, density) in density.iter_mut().enumerate() {
+            *density = self.gaussian(lane, m * m)[1];
         }
         density
     }
@@ -238,9 +238,9 @@ impl Angles {
     #[inline(always)]
     fn ggx(&self, m: f64) -> Numbers {
         let mut density = [0.0; PAIRS];
-        for lane in 0..PAIRS {
+        for (lane, density) in density.iter_mut().enumerate() {
             let over = 1.0 + self.slope2[lane] / (m * m);
-            density[lane] = 1.0 / (PI * m * m * (over * over));
+            *density = 1.0 / (PI * m * m * (over * over));
         }
         if self.beam_rad == [0.0; PAIRS] {
             return density;

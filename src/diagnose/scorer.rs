@@ -58,13 +58,13 @@ pub(super) struct HeldOut {
 }
 
 impl Scorer<'_> {
-    /// ln likelihood, less what speaks against the point of the fit and Schwarz's penalty for every number of the effects (Ann.
+    /// ln likelihood, less how far the laws are from those stored, and Schwarz's penalty for every number of the effects (Ann.
     /// Stat. 6 (1978) 461), of as many observations as patches are held out. It compares models that predict equally well.
     pub fn worth(&self, state: &State) -> f64 {
         let State { space, fit, .. } = state;
         let numbers = (fit.at.len() - space.base_len()) as f64;
         let penalty = 0.5 * numbers * (self.folds.blocks.max(1) as f64).ln();
-        fit.ln_likelihood - space.against(&fit.at) - penalty
+        fit.ln_likelihood - space.off_the_stored(&fit.at) - penalty
     }
 
     /// A fitted model with its held-out scores.
