@@ -102,8 +102,8 @@ impl<'a> Squares<'a> {
     ) -> Local {
         let scale = (DB_PER_NEPER / self.deviations.level_sd_db).powi(2);
         let mut sum = Local::zero(by_coordinate.len());
-        sum.value = 0.5 * scale * moments.squares(table);
-        let slopes = moments.slopes(table);
+        let (squares, slopes) = moments.squares_and_slopes(table);
+        sum.value = 0.5 * scale * squares;
         for (row, by_row) in by_coordinate.iter().enumerate() {
             let Some(by_row) = by_row else { continue };
             sum.gradient[row] = scale * dot(&slopes, by_row.values());

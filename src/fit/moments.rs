@@ -39,18 +39,14 @@ impl Moments {
         Moments { reference, products, by_level, squares }
     }
 
-    /// Σ of squared differences between a table and the levels.
-    pub fn squares(&self, table: &Table) -> f64 {
-        let over = self.over_reference(table);
-        let both: f64 = dot(&over, &self.times(&over)) - 2.0 * dot(&over, &self.by_level);
-        (self.squares + both).max(0.0)
-    }
-
-    /// Σ w·(w·t − y): the slope of half of the squares by every knot of a table.
-    pub fn slopes(&self, table: &Table) -> Vec<f64> {
-        let mut slopes = self.times(&self.over_reference(table));
+    /// Σ of squared differences between a table and the levels, and Σ w·(w·t − y), the slope of half of it by every knot.
+    pub fn squares_and_slopes(&self, table: &Table) -> (f64, Vec<f64>) {
+        let pairs = table.values().iter().zip(self.reference.values());
+        let over: Vec<f64> = pairs.map(|(value, reference)| value - reference).collect();
+        let mut slopes = self.times(&over);
+        let both = dot(&over, &slopes) - 2.0 * dot(&over, &self.by_level);
         slopes.iter_mut().zip(&self.by_level).for_each(|(slope, level)| *slope -= level);
-        slopes
+        ((self.squares + both).max(0.0), slopes)
     }
 
     /// Σ w·(w·t) of a table that counts from nothing, such as a derivative.
@@ -66,11 +62,6 @@ impl Moments {
             }
         }
         sums
-    }
-
-    fn over_reference(&self, table: &Table) -> Vec<f64> {
-        let pairs = table.values().iter().zip(self.reference.values());
-        pairs.map(|(value, reference)| value - reference).collect()
     }
 }
 
@@ -96,12 +87,13 @@ mod tests {
         let moments = Moments::new(reference, levels.iter().map(|(place, y)| (place, *y)));
         let off: Vec<f64> = levels.iter().map(|(place, y)| law.at(place) - y).collect();
         let squares: f64 = off.iter().map(|x| x * x).sum();
-        assert!((moments.squares(&law) / squares - 1.0).abs() < 1e-9);
+        let (found, found_slopes) = moments.squares_and_slopes(&law);
+        assert!((found / squares - 1.0).abs() < 1e-9);
         let mut slopes = vec![0.0; law.values().len()];
         for ((place, _), off) in levels.iter().zip(&off) {
             place.terms().for_each(|(knot, weight)| slopes[knot] += weight * off);
         }
-        for (knot, (found, slope)) in moments.slopes(&law).iter().zip(&slopes).enumerate() {
+        for (knot, (found, slope)) in found_slopes.iter().zip(&slopes).enumerate() {
             assert!((found - slope).abs() < 1e-9, "{knot}: {found} {slope}");
         }
     }
