@@ -15,6 +15,7 @@
 //! | probability of the observations | `likelihood.rs`, `problem.rs`, `shared.rs` |
 //! | several clouds of one target | `views.rs`, `in_scans.rs`, `clouds.rs`, `contradiction.rs` |
 //! | scattering models and effects together | `space.rs`, `refit.rs`, `optima.rs`, `ranges.rs` |
+//! | their standard deviations | `deviations.rs`, `told.rs` |
 //! | the promise of an effect | `screen.rs` |
 //! | the score of a model on held-out patches | `folds.rs`, `score.rs`, `scorer.rs` |
 //! | the choice: trials, support, rivals, removal | `trial.rs`, `support.rs`, `choose.rs`, `exchange.rs`, `explanation.rs` |
@@ -31,6 +32,7 @@ mod contradiction;
 mod controls;
 mod covariates;
 pub mod curve;
+mod deviations;
 mod error;
 mod evidence;
 mod exchange;

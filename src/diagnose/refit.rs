@@ -2,8 +2,7 @@
 //!
 //! The score of each chirp is a difference quotient of ln p. The curvature is Σ L·(y/μ)·g·gᵀ, with g the
 //! slope of ln μ, for unknowns that change means, and the sum of the products of the scores for unknowns that only
-//! change the distribution about the mean. The standard deviations come from the products of the scores at the end
-//! (Berndt, Hall, Hall & Hausman 1974), and from their scatter over cells of the target where that is wider.
+//! change the distribution about the mean.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -11,10 +10,8 @@ use super::folds::Folds;
 use super::likelihood::Term;
 use super::problem::{EFFECT_STEP, Problem, Slope};
 use super::space::Space;
-use super::told;
 use crate::fit::minimise::{Local, Minimise, Stop};
 use crate::fit::shapes;
-use crate::fit::uncertainty::deviations;
 
 /// A full search.
 pub(super) const SEARCH: Minimise = Minimise { iterations: 20, tolerance: 0.1, patience: PATIENCE };
@@ -24,7 +21,7 @@ pub(super) const SCOUT: Minimise = Minimise { iterations: 12, tolerance: 0.1, pa
 const PATIENCE: usize = 8;
 /// Steps of a difference quotient where facets move under the rays, from the first search to the last. ln p then
 /// has jumps. A quotient sees those within its width, and a search moves about as far at a time.
-const WIDE_TO_NARROW: [f64; 3] = [1.0, 0.25, 0.06];
+pub(super) const WIDE_TO_NARROW: [f64; 3] = [1.0, 0.25, 0.06];
 /// Distances along the axes of the curvature that are tried across such jumps, in standard deviations but no more
 /// than an effect's steps.
 const ALONG_AXES: [f64; 4] = [0.3, 1.0, 3.0, 10.0];
@@ -170,18 +167,7 @@ impl Problem<'_> {
     /// an edge one chirp after the other, and its slopes hardly show it.
     pub fn along_axes(&self, space: &Space, at: &DVector<f64>) -> Option<DVector<f64>> {
         let [lower, upper] = space.bounds();
-        let terms = self.terms(space, at);
-        let slopes = self.slopes(space, at, [&lower, &upper], &terms);
-        // The shots that an edge passes over have no curvature.
-        let smooth_m = SMOOTH_M.max(3.0 * self.declared.range_sd_m);
-        let smooth = local(&terms, &slopes, |shot| {
-            let mut of_effects = slopes.iter().skip(space.base_len());
-            of_effects.all(|slopes| {
-                let Slope { ln_mean, range_m, .. } = slopes[shot];
-                ln_mean.abs() * EFFECT_STEP < SMOOTH && range_m.abs() * EFFECT_STEP < smooth_m
-            })
-        });
-        let axes = smooth.curvature.symmetric_eigen();
+        let axes = self.smooth_curvature(space, at).symmetric_eigen();
         let mut best = (self.ln_likelihood(space, at), None);
         for (axis, bend) in axes.eigenvectors.column_iter().zip(&axes.eigenvalues) {
             let reach = bend.max(f64::MIN_POSITIVE).sqrt().recip().min(1.0);
@@ -196,67 +182,21 @@ impl Problem<'_> {
         best.1
     }
 
-    /// Standard deviation of every unknown; infinite where a bound holds it or the data do not determine it. The larger of
-    /// that of a right model and that of a model which is off from cell to cell of the target (Huber 1967, White 1982):
-    /// B⁻¹·J·B⁻¹ with the products B of the shots' scores and those J of the cells' scores.
-    pub fn sd(&self, space: &Space, at: &DVector<f64>, folds: &Folds) -> Vec<f64> {
+    /// Curvature of −ln likelihood without the shots that an edge passes over.
+    pub fn smooth_curvature(&self, space: &Space, at: &DVector<f64>) -> DMatrix<f64> {
         let [lower, upper] = space.bounds();
         let terms = self.terms(space, at);
         let slopes = self.slopes(space, at, [&lower, &upper], &terms);
-        let beside = self.local_beside(space, at, [&lower, &upper]).curvature;
-        let free: Vec<usize> =
-            (0..at.len()).filter(|&i| at[i] > lower[i] && at[i] < upper[i]).collect();
-        let of_free =
-            |whole: DMatrix<f64>| (whole + &beside).select_rows(&free).select_columns(&free);
-        let of_cells = of_free(products_of_cells(&slopes, folds));
-        let of_shots = of_free(products(&terms, [&slopes, &slopes]));
-        let mut told = deviations(&of_shots);
-        if !space.moving().is_empty() {
-            let wide = self.slopes_over(WIDE_TO_NARROW[0], space, at, [&lower, &upper], &terms);
-            let both = of_free(products(&terms, [&slopes, &wide]));
-            told = told::deviations(&of_shots, &both);
-        }
-        let inverse = of_shots.try_inverse().map(|inverse| &inverse * of_cells * &inverse);
-        let mut sd = vec![f64::INFINITY; at.len()];
-        for (place, (&i, told)) in free.iter().zip(told).enumerate() {
-            let over_cells =
-                inverse.as_ref().map_or(0.0, |all| all[(place, place)].max(0.0).sqrt());
-            if let Some(of_model) = told {
-                sd[i] = of_model.max(over_cells);
-            }
-        }
-        sd
-    }
-}
-
-/// Sum of the products of the shots' scores, by slopes of one or of two widths. Powers that share speckle count for less,
-/// ranges do not. Without shared speckle both are one score.
-fn products(terms: &[Term], [one, other]: [&[Vec<Slope>]; 2]) -> DMatrix<f64> {
-    DMatrix::from_fn(one.len(), one.len(), |i, j| {
-        let pairs = terms.iter().zip(one[i].iter().zip(&other[j]));
-        let products = pairs.map(|(term, (a, b))| {
-            if term.weight == 1.0 {
-                return a.ln_p * b.ln_p;
-            }
-            let [power_a, power_b] = [a, b].map(|slope| slope.ln_p - slope.ln_range);
-            power_a * power_b / term.weight + a.ln_range * b.ln_range
+        let smooth_m = SMOOTH_M.max(3.0 * self.declared.range_sd_m);
+        let smooth = local(&terms, &slopes, |shot| {
+            let mut of_effects = slopes.iter().skip(space.base_len());
+            of_effects.all(|slopes| {
+                let Slope { ln_mean, range_m, .. } = slopes[shot];
+                ln_mean.abs() * EFFECT_STEP < SMOOTH && range_m.abs() * EFFECT_STEP < smooth_m
+            })
         });
-        products.sum()
-    })
-}
-
-/// Sum of the products of the cells' scores.
-fn products_of_cells(slopes: &[Vec<Slope>], folds: &Folds) -> DMatrix<f64> {
-    let of_cells: Vec<DVector<f64>> = slopes
-        .iter()
-        .map(|slopes| {
-            let scores: Vec<f64> = slopes.iter().map(|slope| slope.ln_p).collect();
-            DVector::from_vec(folds.cell_sums(&scores))
-        })
-        .collect();
-    let cells = of_cells.first().map_or(2, |sums| sums.len().max(2)) as f64;
-    let products = |i: usize, j: usize| of_cells[i].dot(&of_cells[j]);
-    DMatrix::from_fn(slopes.len(), slopes.len(), products) * (cells / (cells - 1.0))
+        smooth.curvature
+    }
 }
 
 /// Least and largest value of every unknown; those numbered in `held` stay where they are.

@@ -10,6 +10,10 @@ use nalgebra::DMatrix;
 const KEPT: f64 = 1.0 / 9.0;
 /// Share of the variance of an unknown that may lie along other directions, as one width tells them.
 const UNTOLD: f64 = 0.2;
+/// Deviations at which ln p is looked at, and its least fall there, half that of a normal distribution. Nearer, steps of ln p
+/// hide how it falls.
+const TESTED: f64 = 6.0;
+pub(super) const LEAST_FALL: f64 = 9.0;
 /// Least eigenvalue of the scaled products of a direction that one width tells.
 const LEAST: f64 = 1e-6;
 
@@ -53,6 +57,19 @@ pub(super) fn deviations(one: &DMatrix<f64>, both: &DMatrix<f64>) -> Vec<Option<
     deviations
 }
 
+/// A standard deviation, widened until ln p falls as it promises at [`TESTED`] of it on either side; none where that is
+/// farther away than `most`. `fall` is that of ln p at a distance, with all other unknowns where they are likeliest.
+pub(super) fn widened(mut sd: f64, most: f64, mut fall: impl FnMut(f64) -> f64) -> Option<f64> {
+    while TESTED * sd <= most {
+        let mut is_held = |side: f64| fall(side * TESTED * sd) >= LEAST_FALL;
+        if is_held(1.0) && is_held(-1.0) {
+            return Some(sd);
+        }
+        sd *= 2.0;
+    }
+    None
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -88,5 +105,20 @@ mod tests {
         // Nor is one that only acts together with another.
         let same = DMatrix::from_element(2, 2, 3.0);
         assert_eq!(deviations(&same, &same), [None, None]);
+    }
+
+    #[test]
+    fn a_deviation_grows_until_ln_p_falls_as_it_says() {
+        let normal = |by: f64| 0.5 * (by / 0.3).powi(2);
+        assert_eq!(widened(0.3, 10.0, normal), Some(0.3));
+        // Within a factor of √2, as half the fall is enough.
+        let found = widened(0.01, 10.0, normal).unwrap();
+        assert!((0.21..0.43).contains(&found), "{found}");
+        // Steps beside the maximum do not hold what the far side does not, and one side is not enough.
+        assert_eq!(
+            widened(0.01, 10.0, |by| if by.abs() > 1.0 { 3.0 } else { 4.0 * by.abs() }),
+            None
+        );
+        assert_eq!(widened(0.01, 10.0, |by| if by > 0.0 { 1e3 } else { 1.0 }), None);
     }
 }

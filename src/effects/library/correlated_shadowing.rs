@@ -1,4 +1,7 @@
 //! Shadowing and masking as one event: in backscatter G1 where the law has G1².
+//!
+//! Between the two G is a mean of both, weighted by the share. Nothing says which mean: the effect has the geometric one,
+//! which lies between the arithmetic (surfaces of two kinds) and the harmonic.
 
 use crate::brdf::{Brdf, CookTorrance, Scattering, Shadowing};
 use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level};
@@ -6,6 +9,9 @@ use crate::effects::lobes::rescaled;
 use crate::effects::shot::{Shot, Stage};
 
 pub(crate) struct CorrelatedShadowing;
+
+/// Where shadowing counts, and the lobe can still be seen.
+const TYPICAL_G1: f64 = 0.5;
 
 const ABOUT: About = About {
     name: "correlated-shadowing",
@@ -37,8 +43,21 @@ impl Effect for CorrelatedShadowing {
         let retro = shot.to_radar();
         rescaled(law, retro, f_per_sr, &|lobe| {
             let once = CookTorrance { shadowing: Shadowing::Correlated, ..*lobe };
-            (1.0 - share) * lobe.f_per_sr(retro, retro) + share * once.f_per_sr(retro, retro)
+            let twice_per_sr = lobe.f_per_sr(retro, retro);
+            if twice_per_sr < f64::MIN_POSITIVE {
+                return twice_per_sr;
+            }
+            twice_per_sr * (once.f_per_sr(retro, retro) / twice_per_sr).powf(share)
         })
+    }
+
+    /// Half the distance between the shares with which the arithmetic and the harmonic mean come to the same G, at
+    /// [`TYPICAL_G1`].
+    fn form_error(&self, parameter: usize, values: &[f64]) -> f64 {
+        let factor = TYPICAL_G1.powf(-values[parameter]);
+        let arithmetic = (factor - 1.0) / (TYPICAL_G1.recip() - 1.0);
+        let harmonic = (1.0 - factor.recip()) / (1.0 - TYPICAL_G1);
+        0.5 * (harmonic - arithmetic)
     }
 }
 
@@ -60,5 +79,14 @@ mod tests {
         let g1 = Distribution::Beckmann.g1(shot.hit.cos_theta, 0.6);
         assert!(g1 < 0.9);
         assert!((found * g1 - 1.0).abs() < 1e-9, "{found} {g1}");
+        let half = CorrelatedShadowing.scatter(&[0.5], &bench.stage(), &law, &shot, f) / f;
+        assert!((half * g1.sqrt() - 1.0).abs() < 1e-9, "{half} {g1}");
+    }
+
+    #[test]
+    fn at_its_ends_the_form_is_certain() {
+        let error = |share: f64| CorrelatedShadowing.form_error(0, &[share]);
+        assert!(error(0.0).abs() < 1e-12 && error(1.0).abs() < 1e-12);
+        assert!((error(0.5) - 0.086).abs() < 1e-3, "{}", error(0.5));
     }
 }
