@@ -8,7 +8,7 @@ fn main() -> ExitCode {
     match matdb::cli::run(&matdb::cli::Cli::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {}", matdb::cli::message(&error));
+            matdb::cli::say(&format!("error: {}", matdb::cli::message(&error)));
             ExitCode::FAILURE
         }
     }

@@ -534,3 +534,27 @@ fn a_tracer_that_does_not_take_the_rays() {
     }
     assert!(!folder.path().join("out").exists());
 }
+
+#[test]
+#[cfg(target_os = "linux")]
+fn an_error_that_cannot_be_printed_is_a_status() {
+    let full = || fs::File::options().write(true).open("/dev/full").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let program = env!("CARGO_BIN_EXE_matdb");
+        let mut command = std::process::Command::new(program);
+        command.current_dir(folder.path()).args(arguments).stderr(full());
+        command.stdout(std::process::Stdio::null()).status().unwrap().code()
+    };
+    assert_eq!(run(&["show", "nothing"]), Some(1));
+    assert_eq!(run(&["-v", "add", "glass"]), Some(0));
+}
+
+#[test]
+fn a_material_has_a_limit_of_tags_and_a_permittivity_one_of_its_size() {
+    let tags = (0..1001).map(|n| format!("\"t{n}\"")).collect::<Vec<_>>().join(", ");
+    let message = add("tags = [", &format!("tags = [{tags}, "));
+    check(&message, &["tags", "and 1000 are the most", "keep those by which"]);
+    let message = add("\nreal = ", "\nreal = 1e300 # ");
+    check(&message, &["permittivity", "it is beyond 1e12", "relative to that of vacuum"]);
+}

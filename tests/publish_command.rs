@@ -176,6 +176,41 @@ fn changes_are_told_from_one_publication_to_the_next() {
 }
 
 #[test]
+fn a_version_is_text_and_a_name_no_formula() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut store = Store::open(folder.path().join("matdb.sqlite")).unwrap();
+    let mut paint = sample("paint");
+    paint.name = "=HYPERLINK(\"http://x\")".to_owned();
+    store.add([&paint]).unwrap();
+    let about = "title = 't'\nversion = '[1](http://x) <b>'\nlicence = 'CC-BY-4.0'\n";
+    fs::write(folder.path().join("about.toml"), about).unwrap();
+    publish(folder.path());
+    let read = |name: &str| fs::read_to_string(folder.path().join("site").join(name)).unwrap();
+    let changes = read("CHANGES.md");
+    assert!(changes.contains("## \\[1\\](http://x) \\<b\\>"), "{changes}");
+    let table = read("tables/revision.csv");
+    assert!(table.contains("\"'=HYPERLINK(") && !table.contains(",\"=H"), "{table}");
+    matdb(folder.path()).args(["verify", "site", "-q"]).assert().success();
+}
+
+#[test]
+fn an_error_of_the_about_file_is_one_sentence() {
+    let folder = laboratory();
+    for (text, expected) in [
+        ("title = \"a\nb = 3\n", "about.toml: line 1, column 1"),
+        (
+            "titel = 'a'\n",
+            "about.toml: line 1, column 1: unknown key `titel`; did you mean `title`?",
+        ),
+    ] {
+        fs::write(folder.path().join("about.toml"), text).unwrap();
+        let publish = ["publish", "site", "--about", "about.toml"];
+        let said = refused(matdb(folder.path()).args(publish));
+        assert!(said.contains(expected) && said.trim_end().lines().count() == 1, "{said}");
+    }
+}
+
+#[test]
 fn what_the_publication_there_says_of_itself_stays_and_is_said() {
     let folder = laboratory();
     publish(folder.path());
@@ -446,7 +481,17 @@ fn whatever_is_changed_afterwards_is_seen() {
     publish(at);
     let site = at.join("site");
     let forged = "is not what its database gives";
-    let spoils: [(Spoil, &str); 17] = [
+    let spoils: [(Spoil, &str); 18] = [
+        // Without the program's version the pages are compared all the same.
+        (
+            |site| {
+                let mut index = json(&site.join("api/v1/index.json"));
+                assert!(index.as_object_mut().unwrap().remove("program_version").is_some());
+                relist(site, "api/v1/index.json", index.to_string().as_bytes());
+                relist(site, "material/paint.html", b"x");
+            },
+            "material/paint.html: is not what its database gives",
+        ),
         (|site| relist(site, "CITATION.cff", b"x"), forged),
         (|site| relist(site, ".zenodo.json", b"{}"), forged),
         (|site| relist(site, "tables/curve.csv", b"x"), forged),

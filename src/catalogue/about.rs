@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::layout::{ABOUT, SUMS};
+use crate::formats::text::from_toml;
 use crate::material::form::{is_address, is_doi, is_licence, is_orcid};
 use crate::material::{USUAL_TITLE, turns_the_line};
 
@@ -102,7 +103,7 @@ impl About {
     }
 
     fn checked(text: &str) -> Result<About, String> {
-        let about: About = toml::from_str(text).map_err(|error| error.to_string())?;
+        let about: About = from_toml(text).map_err(|error| error.to_string())?;
         about.check()?;
         Ok(about)
     }

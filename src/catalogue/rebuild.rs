@@ -80,8 +80,11 @@ impl Scope {
         let version = read::<Index>(bundle, INDEX).ok().and_then(|index| index.program_version);
         let has_parquet = sums.keys().any(|path| is_parquet(path));
         let same_schema = !store.is_of_older_schema();
+        // Every publication with a database of today's schema states its version: without one it is compared as a whole, and the
+        // index is wrong.
+        let is_ours = version.as_deref().is_none_or(|version| version == env!("CARGO_PKG_VERSION"));
         let scope = Scope {
-            same_version: same_schema && version.as_deref() == Some(env!("CARGO_PKG_VERSION")),
+            same_version: same_schema && is_ours,
             same_schema,
             same_parquet: has_parquet == HAS_PARQUET,
         };

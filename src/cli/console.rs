@@ -37,14 +37,14 @@ impl Console {
     /// Something a person should know, though it is no error.
     pub fn notice(&self, text: &str) {
         if !self.quiet {
-            eprintln!("note: {}", readable(text));
+            say(&format!("note: {}", readable(text)));
         }
     }
 
     /// Something only the curious want to know.
     pub fn detail(&self, text: &str) {
         if self.verbose && !self.quiet {
-            eprintln!("{text}");
+            say(text);
         }
     }
 
@@ -57,8 +57,8 @@ impl Console {
         bar.enable_steady_tick(Duration::from_millis(100));
         bar.set_message(what);
         let has_lines = !self.quiet && !io::stderr().is_terminal();
-        let lines = has_lines
-            .then(|| Lines::begin(what, Duration::from_secs(10), |line| eprintln!("{line}")));
+        let lines =
+            has_lines.then(|| Lines::begin(what, Duration::from_secs(10), |line| say(&line)));
         Activity { what, bar, lines }
     }
 
@@ -126,6 +126,11 @@ impl Lines {
 /// those that turn the direction of a line.
 fn harmless(text: &str) -> String {
     text.chars().filter(|c| (!c.is_control() || *c == '\n') && !is_turning(*c)).collect()
+}
+
+/// Writes a line to standard error. That it cannot be written must not end the work.
+pub fn say(line: &str) {
+    let _ = writeln!(io::stderr(), "{line}");
 }
 
 /// A message as it may be shown: without control characters and those that turn a line, and with words cut

@@ -40,7 +40,7 @@ use clap::{ArgAction, CommandFactory, Parser, Subcommand};
 use crate::error::Error;
 use crate::setup::Database;
 use console::Console;
-pub use console::readable;
+pub use console::{readable, say};
 pub use hint::message;
 
 /// A material database and renderer for 300 GHz imaging radar.

@@ -11,6 +11,10 @@ use super::error::FilesError;
 /// Largest file that [`read_small`] reads, bytes.
 pub const LARGEST_SMALL_FILE_BYTES: u64 = 64 << 20;
 
+/// Largest file that [`read_whole`] reads, and most of a pipe or device, which may have no end, bytes.
+pub(crate) const LARGEST_FILE_BYTES: u64 = 16 << 30;
+const MOST_OF_A_PIPE_BYTES: u64 = 1 << 30;
+
 /// How long a pipe may lack a writer.
 const PATIENCE: Duration = Duration::from_secs(5);
 
@@ -34,16 +38,23 @@ fn open(path: &Path) -> io::Result<File> {
     })
 }
 
-/// Reads a whole file of any size, or a pipe to its end.
+/// Reads a whole file of up to 16 GiB, or a pipe of up to 1 GiB to its end.
 ///
 /// # Errors
-/// A file that cannot be read, a pipe that no program writes to.
+/// A file that cannot be read, or is larger (`ErrorKind::FileTooLarge`); a pipe that no program writes to.
 pub fn read_whole(path: &Path) -> Result<Vec<u8>, FilesError> {
-    let mut bytes = Vec::new();
-    match open(path).and_then(|mut file| file.read_to_end(&mut bytes)) {
-        Ok(_) => Ok(bytes),
-        Err(reason) => Err(FilesError::unreadable(path, reason)),
-    }
+    let whole = open(path).and_then(|file| {
+        let found = file.metadata()?;
+        let most = if found.is_file() { LARGEST_FILE_BYTES } else { MOST_OF_A_PIPE_BYTES };
+        if found.is_file() {
+            check_size(found.len(), most)?;
+        }
+        let mut bytes = Vec::new();
+        file.take(most + 1).read_to_end(&mut bytes)?;
+        check_size(bytes.len() as u64, most)?;
+        Ok(bytes)
+    });
+    whole.map_err(|reason| FilesError::unreadable(path, reason))
 }
 
 /// Reads a whole small file. A pipe is read as well, up to the same size: a file without an end is refused.
@@ -55,15 +66,20 @@ pub fn read_small(path: &Path) -> Result<Vec<u8>, FilesError> {
     let mut bytes = Vec::new();
     let read =
         open(path).and_then(|file| file.take(LARGEST_SMALL_FILE_BYTES + 1).read_to_end(&mut bytes));
-    let reason = match read {
-        Err(reason) => reason,
-        Ok(_) if bytes.len() as u64 <= LARGEST_SMALL_FILE_BYTES => return Ok(bytes),
-        Ok(_) => {
-            let problem = format!("it is larger than {} MiB", LARGEST_SMALL_FILE_BYTES >> 20);
-            io::Error::new(ErrorKind::FileTooLarge, problem)
-        }
+    let read = read.and_then(|_| check_size(bytes.len() as u64, LARGEST_SMALL_FILE_BYTES));
+    read.map(|()| bytes).map_err(|reason| FilesError::unreadable(path, reason))
+}
+
+/// Refuses a size beyond the most, `ErrorKind::FileTooLarge`.
+pub(crate) fn check_size(bytes: u64, most: u64) -> io::Result<()> {
+    if bytes <= most {
+        return Ok(());
+    }
+    let problem = match most >> 30 {
+        0 => format!("it is larger than {} MiB", most >> 20),
+        gib => format!("it is larger than {gib} GiB"),
     };
-    Err(FilesError::unreadable(path, reason))
+    Err(io::Error::new(ErrorKind::FileTooLarge, problem))
 }
 
 #[cfg(test)]
@@ -83,6 +99,9 @@ mod tests {
             .set_len(LARGEST_SMALL_FILE_BYTES + 1)
             .unwrap();
         assert_eq!(read_small(&path).unwrap_err().reason.kind(), ErrorKind::FileTooLarge);
+        File::options().write(true).open(&path).unwrap().set_len(LARGEST_FILE_BYTES + 1).unwrap();
+        let refused = read_whole(&path).unwrap_err();
+        assert!(refused.to_string().contains("it is larger than 16 GiB"), "{refused}");
         let missing = read_small(&folder.path().join("missing")).unwrap_err();
         assert!(missing.to_string().ends_with("; check the path"), "{missing}");
     }

@@ -36,13 +36,14 @@ impl MeshFormat {
     ///
     /// # Errors
     /// When the bytes are not a file of the format, by their place; [`FormatError::Mesh`] when the mesh has no facets or a
-    /// vertex that is not finite.
+    /// facet with a corner that is not finite.
     pub fn read(self, bytes: &[u8]) -> Result<Mesh, FormatError> {
         let mesh = match self {
             MeshFormat::Ply => ply::read_mesh(bytes),
             MeshFormat::Obj => obj::read_mesh(bytes),
             MeshFormat::Stl => stl::read_mesh(bytes),
         }?;
+        let mesh = mesh.without_removed_vertices();
         mesh.validate()?;
         Ok(mesh)
     }

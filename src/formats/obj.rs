@@ -7,22 +7,23 @@
 use std::borrow::Cow;
 
 use super::error::FormatError;
-use super::line::{excerpt, point};
+use super::line::{self, excerpt, point};
 use crate::geometry::Mesh;
 use crate::geometry::mesh::LabelBuilder;
 
 /// Reads the polygons of an OBJ file.
 ///
-/// Polygons become fans of triangles round their first corner. Facets are labelled `usemtl` by
+/// Polygons become fans of triangles round their first corner; faces of one or two corners are no surface and are skipped, as
+/// lines are. Facets are labelled `usemtl` by
 /// material name and `group` by the text of the latest `g` or `o`; a label that no facet has a name
 /// in is left out.
 ///
 /// # Errors
 ///
-/// Names the line of a vertex without three numbers, of a face with fewer than three corners, or of
-/// a face that refers to a vertex that does not exist.
+/// Names the line of a vertex without three numbers, of a face without corners, or of a face that refers to a vertex that does
+/// not exist.
 pub fn read_mesh(bytes: &[u8]) -> Result<Mesh, FormatError> {
-    let text = String::from_utf8_lossy(bytes);
+    let text = line::text(bytes)?;
     let mut reader = Reader::new();
     for (line, statement) in statements(&text) {
         reader.read(line, &statement).map_err(|problem| malformed(line, problem))?;
@@ -32,7 +33,7 @@ pub fn read_mesh(bytes: &[u8]) -> Result<Mesh, FormatError> {
 
 /// Logical lines with the number, from 1, of their first physical line.
 fn statements(text: &str) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
-    let mut lines = (1..).zip(text.lines());
+    let mut lines = (1..).zip(line::lines(text));
     std::iter::from_fn(move || {
         let (number, line) = lines.next()?;
         let mut statement = Cow::Borrowed(line);
@@ -92,19 +93,16 @@ impl Reader {
     fn face(&mut self, line: usize, rest: &str) -> Result<(), String> {
         let facets_before = self.mesh.facets.len();
         let mut words = rest.split_whitespace().take_while(|word| !word.starts_with('#'));
-        if let (Some(first), Some(second)) = (words.next(), words.next()) {
-            let first = self.corner(line, first)?;
-            let mut previous = self.corner(line, second)?;
-            for word in words {
-                let next = self.corner(line, word)?;
+        let first = words.next().ok_or("a face has no corners")?;
+        let first = self.corner(line, first)?;
+        let mut previous = None;
+        for word in words {
+            let next = self.corner(line, word)?;
+            if let Some(previous) = previous.replace(next) {
                 self.mesh.facets.push([first, previous, next]);
-                previous = next;
             }
         }
         let facets = self.mesh.facets.len() - facets_before;
-        if facets == 0 {
-            return Err(format!("face {} has fewer than 3 corners", excerpt(rest)));
-        }
         self.materials.push(&self.material, facets);
         self.groups.push(&self.group, facets);
         Ok(())
@@ -125,7 +123,7 @@ impl Reader {
     fn finish(self) -> Result<Mesh, FormatError> {
         let Reader { mut mesh, materials, groups, furthest: (index, line), .. } = self;
         let vertices = mesh.vertices.len();
-        if !mesh.facets.is_empty() && index as usize >= vertices {
+        if line > 0 && index as usize >= vertices {
             let vertex = u64::from(index) + 1;
             let problem = format!("there is no vertex {vertex}, only {vertices} are defined");
             return Err(malformed(line, problem));
@@ -205,6 +203,24 @@ mod tests {
     }
 
     #[test]
+    fn a_byte_order_mark_and_old_line_ends_lose_no_vertex() {
+        let text = format!("{SQUARE}f 1 2 3\nf 1 3 4\n");
+        let expected = read_mesh(text.as_bytes()).unwrap();
+        assert_eq!(expected.vertices.len(), 4);
+        let mixed = text.replacen('\n', "\r", 2);
+        for text in [format!("\u{feff}{text}"), text.replace('\n', "\r"), mixed] {
+            assert_eq!(read_mesh(text.as_bytes()).unwrap(), expected, "{text:?}");
+        }
+    }
+
+    #[test]
+    fn faces_of_two_corners_are_lines() {
+        let mesh = read("usemtl a\nf 1 2\nf 1\nf 1 2 3\n").unwrap();
+        assert_eq!(mesh.facets, [[0, 1, 2]]);
+        assert_eq!(mesh.labels[0].names.len(), 1);
+    }
+
+    #[test]
     fn text_need_not_be_utf8() {
         let mesh = read_mesh(b"# caf\xe9\nv 0 0 0\nusemtl \xe9\nf 1 1 1\n").unwrap();
         assert_eq!(mesh.labels[0].names, ["\u{fffd}"]);
@@ -217,8 +233,9 @@ mod tests {
             ("\nf 1 2 0", "line 6: there is no vertex 0; "),
             ("f 1 2 -5", "line 5: there is no vertex -5; "),
             ("f 1 2 9999999999", "line 5: there is no vertex 9999999999; "),
-            ("f 1 2", "line 5: face \"1 2\" has fewer than 3 corners; "),
-            ("f", "line 5: face \"\" has fewer"),
+            ("f 1 5", "line 5: there is no vertex 5, only 4 are defined; "),
+            ("f", "line 5: a face has no corners; "),
+            ("f # 1 2 3", "line 5: a face has no corners; "),
             ("f 1 2 x/1/1", "line 5: corner \"x/1/1\" has no vertex number; "),
             ("v 1 2", "line 5: vertex \"1 2\" is not three numbers; "),
             ("f 1 \\\n2 3\nv 1 \\\n x 3", "line 7: vertex \"1   x 3\" is not"),

@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use glam::DVec3;
 
 use super::error::FormatError;
-use super::line::{excerpt, point};
+use super::line::{self, excerpt, point};
 use crate::geometry::Mesh;
 use crate::geometry::mesh::LabelBuilder;
 
@@ -16,26 +16,38 @@ const FACET_BYTES: usize = 50;
 
 /// Reads the triangles of an STL file. Corners of equal bits become one vertex.
 ///
-/// A file is binary when its length is what its count asks for, even if it begins with `solid`. An
-/// ascii file of several solids gets the label `solid` with their names.
+/// A file is binary when its length is what its count asks for, even if it begins with `solid`; behind the facets it may hold less
+/// than a facet takes, or zeros. An ascii file of several solids gets the label `solid` with their names. Its words may be on any
+/// lines, and the ends of loops, facets and solids in one word or two.
 ///
 /// # Errors
 ///
 /// When a binary file's length and its count disagree; names the line at which an ascii file
 /// breaks the format or ends too early.
 pub fn read_mesh(bytes: &[u8]) -> Result<Mesh, FormatError> {
+    if let Some((facets, [])) = binary_facets(bytes) {
+        return Ok(read_binary(facets));
+    }
+    let text = line::text(bytes)?;
+    if is_text(text.as_bytes()) {
+        return read_ascii(&text);
+    }
     match binary_facets(bytes) {
-        Some(facets) => Ok(read_binary(facets)),
-        None if is_text(bytes) => read_ascii(&String::from_utf8_lossy(bytes)),
-        None => Err(neither(bytes)),
+        Some((facets, rest)) if is_padding(facets, rest) => Ok(read_binary(facets)),
+        _ => Err(neither(bytes)),
     }
 }
 
-/// The facets' bytes, if there are as many as the header says.
-fn binary_facets(bytes: &[u8]) -> Option<&[u8]> {
+/// The bytes of as many facets as the header says, and those behind them.
+fn binary_facets(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
     let (header, facets) = bytes.split_at_checked(HEADER_BYTES)?;
     let count = u32::from_le_bytes(*header.last_chunk()?) as usize;
-    (count.checked_mul(FACET_BYTES)? == facets.len()).then_some(facets)
+    facets.split_at_checked(count.checked_mul(FACET_BYTES)?)
+}
+
+/// Whether the bytes behind the facets can be no facet that the count has missed.
+fn is_padding(facets: &[u8], rest: &[u8]) -> bool {
+    !facets.is_empty() && (rest.len() < FACET_BYTES || rest.iter().all(|byte| *byte == 0))
 }
 
 /// Binary files that are cut short may begin with `solid` too, but hold zero bytes.
@@ -82,9 +94,9 @@ fn corner(bytes: &[u8; 12]) -> DVec3 {
 fn read_ascii(text: &str) -> Result<Mesh, FormatError> {
     let mut reader = AsciiReader::new();
     let mut lines = 0;
-    for line in text.lines() {
+    for line in line::lines(text) {
         lines += 1;
-        reader.read(line.trim()).map_err(|problem| malformed(lines, problem))?;
+        reader.read(line).map_err(|problem| malformed(lines, problem))?;
     }
     reader.finish().map_err(|problem| malformed(lines, problem))
 }
@@ -110,19 +122,45 @@ impl AsciiReader {
         }
     }
 
+    /// Reads a line, on which several statements may follow each other.
     fn read(&mut self, line: &str) -> Result<(), String> {
-        let (keyword, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
-        match keyword.to_ascii_lowercase().as_str() {
-            "vertex" => {
-                let corner = point(rest.split_whitespace())
-                    .ok_or_else(|| format!("vertex {} is not three numbers", excerpt(rest)))?;
-                self.corners.push(self.welder.vertex(corner));
+        let mut rest = line.trim();
+        while !rest.is_empty() {
+            let statement = rest;
+            let keyword = word(&mut rest).to_ascii_lowercase();
+            let ended = if keyword == "end" { word(&mut rest) } else { "" };
+            match (keyword + ended).to_ascii_lowercase().as_str() {
+                "vertex" => {
+                    let coordinates = rest;
+                    let corner = point((0..3).map(|_| word(&mut rest))).ok_or_else(|| {
+                        format!("vertex {} is not three numbers", excerpt(coordinates))
+                    })?;
+                    self.corners.push(self.welder.vertex(corner));
+                }
+                "facet" => {
+                    // The word `normal` and three numbers, of which some writers leave out all.
+                    let mut behind = rest;
+                    if word(&mut behind).eq_ignore_ascii_case("normal") {
+                        for _ in 0..3 {
+                            word(&mut behind);
+                        }
+                        rest = behind;
+                    }
+                }
+                "outer" if word(&mut rest).eq_ignore_ascii_case("loop") => {}
+                "endloop" => self.end_facet()?,
+                "endfacet" => {}
+                // Their names reach to the end of the line.
+                "solid" => {
+                    self.solid = Some(rest.to_owned());
+                    return Ok(());
+                }
+                "endsolid" => {
+                    self.solid = None;
+                    return Ok(());
+                }
+                _ => return Err(format!("{} is not STL", excerpt(statement))),
             }
-            "endloop" => self.end_facet()?,
-            "solid" => self.solid = Some(rest.trim().to_owned()),
-            "endsolid" => self.solid = None,
-            "" | "facet" | "outer" | "endfacet" => {}
-            _ => return Err(format!("{} is not STL", excerpt(line))),
         }
         Ok(())
     }
@@ -137,13 +175,23 @@ impl AsciiReader {
     }
 
     fn finish(self) -> Result<Mesh, String> {
-        if self.solid.is_some() || !self.corners.is_empty() {
-            return Err("the file ends inside a solid".to_owned());
+        if !self.corners.is_empty() {
+            return Err("the file ends inside a facet".to_owned());
+        }
+        if self.solid.is_some() {
+            return Err("the file ends without endsolid and may be cut short".to_owned());
         }
         let solids = self.solids.finish();
         let labels = if solids.names.len() > 1 { vec![solids] } else { Vec::new() };
         Ok(Mesh { vertices: self.welder.vertices, facets: self.facets, labels })
     }
+}
+
+/// The next word of a line, which then begins behind it; empty at its end.
+fn word<'a>(line: &mut &'a str) -> &'a str {
+    let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+    *line = rest.trim_start();
+    word
 }
 
 fn malformed(line: usize, problem: String) -> FormatError {
@@ -225,6 +273,17 @@ mod tests {
     }
 
     #[test]
+    fn words_may_be_on_any_lines_and_ends_in_two_words() {
+        let usual = solid("plate");
+        let expected = read_mesh(usual.as_bytes()).unwrap();
+        let split = usual.replace("endloop", "end loop").replace("endfacet", "end facet");
+        let joined = usual.replacen('\n', "\r", 1).replace("\n ", "  ");
+        for text in [format!("\u{feff}{usual}"), usual.replace('\n', "\r"), split, joined] {
+            assert_eq!(read_mesh(text.as_bytes()).unwrap(), expected, "{text:?}");
+        }
+    }
+
+    #[test]
     fn several_solids_are_all_read_and_labelled() {
         let mesh = read_mesh((solid("left arm") + &solid("right arm")).as_bytes()).unwrap();
         assert_eq!(mesh.facets.len(), 4);
@@ -237,11 +296,18 @@ mod tests {
     fn a_binary_file_must_be_as_long_as_its_count_says() {
         for title in ["made by hand", "solid plate"] {
             let bytes = binary(title);
-            for wrong in [&bytes[..183], &[bytes.as_slice(), &[0]].concat()] {
+            for wrong in [&bytes[..183], &[bytes.as_slice(), &[7; 50]].concat()] {
                 let expected = "byte 80: 2 facets take 184 bytes, but the file has";
                 assert!(message(wrong).starts_with(expected), "{}", message(wrong));
             }
+            // Less than a facet, or zeros, can be no facet.
+            for rest in [&b"\r\n"[..], &[0; 512]] {
+                let mesh = read_mesh(&[&bytes, rest].concat()).unwrap();
+                assert_eq!(mesh, read_mesh(&bytes).unwrap());
+            }
         }
+        let none = [&binary("none")[..80], &[0; 104]].concat();
+        assert!(message(&none).starts_with("byte 80: 0 facets take 84 bytes, but"));
         assert!(message(b"").starts_with("byte 0: this is not an STL file"));
         assert!(message(&[0; 80]).starts_with("byte 0: this is not an STL file"));
         assert!(message(&[0xff; 84]).starts_with("byte 80: 4294967295 facets"));
@@ -255,7 +321,17 @@ mod tests {
             ("vertex 1 0 0", "vertex 1 0,0 0", "line 5: vertex "),
             ("      vertex 1 0 0\n", "", "line 6: a facet has 2 corners; "),
             ("outer loop", "inner loop", "line 3: \"inner loop\" is not STL; "),
-            ("endsolid plate\n", "", "line 15: the file ends inside a solid; "),
+            (
+                "endsolid plate\n",
+                "",
+                "line 15: the file ends without endsolid and may be cut short; ",
+            ),
+            (
+                "endloop\n  endfacet\nendsolid plate\n",
+                "",
+                "line 14: the file ends inside a facet; ",
+            ),
+            ("facet normal 0 0 1", "normal 0 0 1", "line 2: \"normal 0 0 1\" is not STL; "),
         ];
         for (what, instead, expected) in cases {
             let problem = message(good.replacen(what, instead, 1).as_bytes());

@@ -93,6 +93,9 @@ impl LabelBuilder {
 
     /// Gives the next `facets` facets the name `name`; names are numbered in order of first appearance.
     pub fn push(&mut self, name: &str, facets: usize) {
+        if facets == 0 {
+            return;
+        }
         let number = self.number(name);
         self.labels.name_of_facet.extend(std::iter::repeat_n(number, facets));
     }
@@ -191,6 +194,44 @@ impl Mesh {
             }
             None => Ok(()),
         }
+    }
+
+    /// Adds facets of vertices that are there, without names.
+    pub fn push_unnamed(&mut self, facets: &[[u32; 3]]) {
+        self.facets.extend_from_slice(facets);
+        for labels in &mut self.labels {
+            labels.append(&FacetLabels::unnamed(&labels.property, facets.len()));
+        }
+    }
+
+    /// Without the vertices that no facet has, where one of these is not finite: tools mark removed ones so.
+    #[must_use]
+    pub fn without_removed_vertices(mut self) -> Mesh {
+        if self.vertices.iter().all(|vertex| vertex.is_finite()) {
+            return self;
+        }
+        let mut is_used = vec![false; self.vertices.len()];
+        for &index in self.facets.as_flattened() {
+            // `validate` names an index beyond the vertices.
+            let Some(used) = is_used.get_mut(index as usize) else { return self };
+            *used = true;
+        }
+        let are_finite =
+            std::iter::zip(&self.vertices, &is_used).all(|(v, used)| !used || v.is_finite());
+        if !are_finite {
+            return self;
+        }
+        let mut next = 0;
+        let renumbered: Vec<u32> = (is_used.iter())
+            .map(|&used| {
+                next += u32::from(used);
+                next.saturating_sub(1)
+            })
+            .collect();
+        let mut used = is_used.into_iter();
+        self.vertices.retain(|_| used.next().unwrap_or(true));
+        self.facets.as_flattened_mut().iter_mut().for_each(|i| *i = renumbered[*i as usize]);
+        self
     }
 
     /// The corners of a facet, m. Panics when `facet` is out of range.
@@ -328,6 +369,23 @@ mod tests {
         assert_eq!(normals[0], DVec3::ZERO);
         assert!(normals[3].dot(mesh.area_normal(1).normalize()) > 1.0 - 1e-12);
         assert!(mesh.vertex_normals()[0].distance(DVec3::Z) < 1e-12);
+    }
+
+    #[test]
+    fn removed_vertices_are_no_part_of_a_mesh() {
+        let corner = |x: f64| DVec3::new(x, x * x, 1.0);
+        let mesh = Mesh {
+            vertices: vec![corner(0.0), DVec3::NAN, corner(1.0), corner(2.0), corner(3.0)],
+            facets: vec![[0, 2, 4]],
+            labels: vec![],
+        };
+        let kept = mesh.clone().without_removed_vertices();
+        assert_eq!((kept.vertices.len(), kept.facets.as_slice()), (3, [[0, 1, 2]].as_slice()));
+        assert_eq!(kept.corners(0), mesh.corners(0));
+        // One that a facet has is an error, by its own number.
+        let damaged = Mesh { facets: vec![[0, 1, 4]], ..mesh };
+        let damaged = damaged.without_removed_vertices();
+        assert!(matches!(damaged.validate(), Err(MeshError::NotFinite { vertex: 1, .. })));
     }
 
     #[test]

@@ -11,10 +11,17 @@ use super::provenance::{Session, Source};
 use super::revision::Material;
 use crate::formats::EffectEntry;
 
+/// Most tags of a material. Each takes time when a material is added.
+const MOST_TAGS: usize = 1000;
+
 impl Material {
     /// Checks names, references, ranges and values.
     pub fn validate(&self) -> Result<(), MaterialError> {
         self.check_lengths()?;
+        if self.tags.len() > MOST_TAGS {
+            let problem = format!("{} are given and {MOST_TAGS} are the most", self.tags.len());
+            return Err(value("tags", &problem, "keep those by which the material is looked for"));
+        }
         self.check_text()?;
         self.check_limits()?;
         unique("source", self.sources.iter().map(|s| s.key.as_str()))?;

@@ -74,12 +74,19 @@ impl Layer {
     }
 }
 
+/// Largest part of a permittivity. Metals come to 10⁷ at 100 GHz.
+const MOST_PERMITTIVITY: f64 = 1e12;
+
 impl Permittivity {
     pub(super) fn validate(&self, place: &str) -> Result<(), MaterialError> {
         let check = NumberCheck::new(place);
         check.positive("the frequency", [self.frequency_hz])?;
         check.positive("the temperature above absolute zero", self.temperature_k)?;
         check.finite("the real part", [self.real])?;
+        if self.real.abs().max(self.imaginary.abs()) > MOST_PERMITTIVITY {
+            let problem = format!("it is beyond {MOST_PERMITTIVITY:e}");
+            return Err(value(place, &problem, "write it relative to that of vacuum"));
+        }
         if self.imaginary < 0.0 {
             let problem = "the imaginary part is negative, which would amplify";
             return Err(value(place, problem, "write eps' - j eps'' with eps'' of 0 or more"));

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::builtin;
 use super::error::SceneError;
+use crate::files::{LARGEST_FILE_BYTES, LARGEST_SMALL_FILE_BYTES, check_size};
 use crate::formats::FormatError;
 use crate::formats::text::nearest;
 
@@ -12,6 +13,8 @@ pub fn read_text(path: &Path) -> Result<String, SceneError> {
     if let Some(name) = path.to_str().and_then(|path| path.strip_prefix("builtin:")) {
         return builtin::text(name).map(str::to_owned).ok_or_else(|| unknown(path, name));
     }
+    let size = std::fs::metadata(path).map_or(0, |found| found.len());
+    check_size(size, LARGEST_SMALL_FILE_BYTES).map_err(|reason| unreadable(path, reason, ""))?;
     String::from_utf8(read(path, "")?).map_err(|error| {
         let place = format!("byte {}", error.utf8_error().valid_up_to());
         let way_out = "a scene is a text file in UTF-8; were cloud and scene swapped?";
@@ -37,16 +40,18 @@ fn unknown(path: &Path, name: &str) -> SceneError {
 /// Reads a whole file that another one names: a pipe would never end, and a device has no size to trust. What a person
 /// names may well be a pipe.
 pub(crate) fn read_regular(path: &Path) -> std::io::Result<Vec<u8>> {
-    if !std::fs::metadata(path)?.is_file() {
+    let found = std::fs::metadata(path)?;
+    if !found.is_file() {
         return Err(std::io::Error::other("it is not a regular file"));
     }
+    check_size(found.len(), LARGEST_FILE_BYTES)?;
     std::fs::read(path)
 }
 
 pub(super) fn read(path: &Path, hint: &'static str) -> Result<Vec<u8>, SceneError> {
-    read_regular(path).map_err(|reason| SceneError::Unreadable {
-        file: path.to_owned(),
-        reason,
-        hint,
-    })
+    read_regular(path).map_err(|reason| unreadable(path, reason, hint))
+}
+
+fn unreadable(path: &Path, reason: std::io::Error, hint: &'static str) -> SceneError {
+    SceneError::Unreadable { file: path.to_owned(), reason, hint }
 }

@@ -165,7 +165,14 @@ fn line(change: &Change) -> String {
     format!("- {}, {revision}{}\n", change.slug, harmless(&status))
 }
 
-/// The text without what could end its line.
+/// The text as Markdown of one line: without what could end it, and with all that would be more than text escaped.
 fn harmless(text: &str) -> String {
-    text.chars().filter(|c| !c.is_control()).collect()
+    let mut harmless = String::with_capacity(text.len());
+    for c in text.chars().filter(|c| !c.is_control()) {
+        if "\\`*_[]<>#&|~".contains(c) {
+            harmless.push('\\');
+        }
+        harmless.push(c);
+    }
+    harmless
 }

@@ -1,5 +1,6 @@
 //! Tables as comma-separated values: UTF-8 with a header. A cell without a value is empty, and numbers have as many
-//! digits as it takes to read them back bit for bit.
+//! digits as it takes to read them back bit for bit. A text that a spreadsheet would take for a formula has an apostrophe
+//! before it.
 
 use std::io;
 
@@ -53,8 +54,14 @@ fn text(cell: &Cell) -> String {
         Cell::Null => String::new(),
         Cell::Integer(number) => number.to_string(),
         Cell::Real(number) => format!("{number:?}"),
+        Cell::Text(text) if is_formula(text) => format!("'{text}"),
         Cell::Text(text) => (*text).to_owned(),
     }
+}
+
+/// Whether a spreadsheet would compute a text, which can send the table to a stranger.
+fn is_formula(text: &str) -> bool {
+    text.starts_with(['=', '+', '-', '@', '\t', '\r']) && text.parse::<f64>().is_err()
 }
 
 /// The units of all numeric columns, one per line.
@@ -70,4 +77,20 @@ pub(super) fn units(tables: &[Table]) -> Vec<u8> {
         }
     }
     lines.into_bytes()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_text_is_a_formula() {
+        let cell = |words: &str| text(&Cell::Text(words));
+        for words in ["=HYPERLINK(\"http://x\")", "+A1", "-A1+2", "@SUM(A1)", "\t=1"] {
+            assert_eq!(cell(words), format!("'{words}"));
+        }
+        for words in ["", "-40", "+1e3", "a = 1", "paint"] {
+            assert_eq!(cell(words), words);
+        }
+    }
 }

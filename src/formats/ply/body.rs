@@ -11,6 +11,8 @@ pub(super) struct Body<'a> {
     rest: &'a [u8],
     file_bytes: usize,
     line: usize,
+    /// Where the entry begins that was read last.
+    line_of_row: usize,
 }
 
 /// One entry of an element.
@@ -24,7 +26,7 @@ pub(super) struct Row {
 impl<'a> Body<'a> {
     pub fn new(header: &Header<'a>, file_bytes: usize) -> Body<'a> {
         let Header { encoding, body, lines, .. } = *header;
-        Body { encoding, rest: body, file_bytes, line: lines + 1 }
+        Body { encoding, rest: body, file_bytes, line: lines + 1, line_of_row: lines + 1 }
     }
 
     /// Hands every entry of `element` to `visit` with its number; `list` is the one list to keep.
@@ -58,11 +60,17 @@ impl<'a> Body<'a> {
         self.rest = self.rest.get(bytes..).unwrap_or_default();
     }
 
+    /// Whether a binary file goes on behind what was read.
+    pub fn has_more_bytes(&self) -> bool {
+        self.encoding != Encoding::Ascii && !self.rest.is_empty()
+    }
+
     fn read_row(&mut self, element: &Element, list: Option<usize>, row: &mut Row) -> Option<()> {
         let is_text = self.encoding == Encoding::Ascii;
         if is_text {
             self.skip_to_text();
         }
+        self.line_of_row = self.line;
         for (at, (property, value)) in element.properties.iter().zip(&mut row.scalars).enumerate() {
             match property.shape {
                 Shape::Scalar(scalar) => *value = self.number(scalar)?,
@@ -109,6 +117,8 @@ impl<'a> Body<'a> {
             Scalar::UInt => u32::from_le_bytes(self.take()?).into(),
             Scalar::Float => f32::from_le_bytes(self.take()?).into(),
             Scalar::Double => f64::from_le_bytes(self.take()?),
+            Scalar::Long => exact(scalar, i64::from_le_bytes(self.take()?) as f64)?,
+            Scalar::ULong => exact(scalar, u64::from_le_bytes(self.take()?) as f64)?,
         })
     }
 
@@ -123,10 +133,10 @@ impl<'a> Body<'a> {
         Some(bytes)
     }
 
-    /// The next number on this line. Floats keep all the digits of the text, even where the header
+    /// The next number of a text; a long entry may go on in the next line. Floats keep all the digits of the text, even where the header
     /// says single precision.
     fn text_number(&mut self, scalar: Scalar) -> Option<f64> {
-        self.skip_blanks();
+        self.skip_to_text();
         let end = self.rest.iter().position(u8::is_ascii_whitespace).unwrap_or(self.rest.len());
         let (word, rest) = self.rest.split_at(end);
         let value: f64 = str::from_utf8(word).ok()?.parse().ok()?;
@@ -137,7 +147,12 @@ impl<'a> Body<'a> {
     fn skip_to_text(&mut self) {
         let text = self.rest.trim_ascii_start();
         let skipped = &self.rest[..self.rest.len() - text.len()];
-        self.line += skipped.iter().filter(|&&byte| byte == b'\n').count();
+        let ends = skipped.iter().enumerate().filter(|(at, byte)| match byte {
+            b'\n' => true,
+            b'\r' => self.rest.get(at + 1) != Some(&b'\n'),
+            _ => false,
+        });
+        self.line += ends.count();
         self.rest = text;
     }
 
@@ -154,13 +169,22 @@ impl<'a> Body<'a> {
 
     fn mismatch(&self, element: &Element, number: usize) -> FormatError {
         let place = match self.encoding {
-            Encoding::Ascii => format!("line {}", self.line),
+            Encoding::Ascii => format!("line {}", self.line_of_row),
             _ => format!("byte {}", self.file_bytes - self.rest.len()),
         };
-        let problem = match self.rest {
+        let rest = match self.encoding {
+            Encoding::Ascii => self.rest.trim_ascii_start(),
+            _ => self.rest,
+        };
+        let problem = match rest {
             [] => format!("the file ends inside {} {number}", element.name),
             _ => format!("{} {number} does not follow the header", element.name),
         };
         FormatError::at(place, problem, "copy or export the file again")
     }
+}
+
+/// A 64-bit integer, if a double holds it.
+fn exact(scalar: Scalar, value: f64) -> Option<f64> {
+    scalar.holds(value).then_some(value)
 }

@@ -6,7 +6,7 @@ use ply_rs::parser::{ParseError, Parser, Reader};
 use ply_rs::ply::{DefaultElement, ElementDef, Encoding, PropertyDef, PropertyType, ScalarType};
 
 use crate::formats::error::FormatError;
-use crate::formats::line::excerpt;
+use crate::formats::line::{excerpt, without_mark};
 
 /// How a number is stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,7 +27,14 @@ pub enum Scalar {
     Float,
     /// 64-bit floating point.
     Double,
+    /// 64-bit signed integer, of at most 2⁵³. Not in the format's first description.
+    Long,
+    /// 64-bit unsigned integer, of at most 2⁵³. Not in the format's first description.
+    ULong,
 }
+
+/// The largest integer up to which doubles hold all.
+const MOST_EXACT: f64 = (1_u64 << 53) as f64;
 
 impl Scalar {
     /// The name a header gives it.
@@ -41,7 +48,14 @@ impl Scalar {
             Scalar::UInt => "uint",
             Scalar::Float => "float",
             Scalar::Double => "double",
+            Scalar::Long => "int64",
+            Scalar::ULong => "uint64",
         }
+    }
+
+    /// The 64-bit integer that a header's word stands for.
+    fn wide(word: &str) -> Option<Scalar> {
+        [Scalar::Long, Scalar::ULong].into_iter().find(|scalar| scalar.name() == word)
     }
 
     /// Whether `value` can be stored: integers take whole numbers in their range, floats anything.
@@ -60,6 +74,8 @@ impl Scalar {
             Scalar::UShort => Some((u16::MIN.into(), u16::MAX.into())),
             Scalar::Int => Some((i32::MIN.into(), i32::MAX.into())),
             Scalar::UInt => Some((u32::MIN.into(), u32::MAX.into())),
+            Scalar::Long => Some((-MOST_EXACT, MOST_EXACT)),
+            Scalar::ULong => Some((0.0, MOST_EXACT)),
             Scalar::Float | Scalar::Double => None,
         }
     }
@@ -69,7 +85,7 @@ impl Scalar {
             Scalar::Char | Scalar::UChar => 1,
             Scalar::Short | Scalar::UShort => 2,
             Scalar::Int | Scalar::UInt | Scalar::Float => 4,
-            Scalar::Double => 8,
+            Scalar::Double | Scalar::Long | Scalar::ULong => 8,
         }
     }
 }
@@ -171,15 +187,19 @@ pub(super) struct Header<'a> {
 impl Header<'_> {
     /// Parses the header and checks every count against the bytes that follow.
     pub fn read(bytes: &[u8]) -> Result<Header<'_>, FormatError> {
-        let (text, body) = split(bytes)?;
-        let mut reader = Reader::new(Cursor::new(text.as_bytes()));
+        let (text, body) = split(without_mark(bytes))?;
+        // The parser knows no integers of 64 bits: it reads them as doubles, which are as long.
+        let (known, wide) = without_wide(&text);
+        let mut reader = Reader::new(Cursor::new(known.as_bytes()));
         let parsed = Parser::<DefaultElement>::new()
             .read_header(&mut reader)
             .map_err(|error| not_understood(&text, &error))?;
+        let mut elements: Vec<Element> = parsed.elements.into_values().map(Element::from).collect();
+        widen(&mut elements, &wide);
         let header = Header {
             encoding: parsed.encoding,
             comments: parsed.comments,
-            elements: parsed.elements.into_values().map(Element::from).collect(),
+            elements,
             lines: text.lines().count(),
             body,
         };
@@ -237,17 +257,63 @@ impl Header<'_> {
     }
 }
 
-/// Splits a file after its `end_header` line.
+/// The types of each property, in the order of the header, of which some are integers of 64 bits.
+type Wide = Vec<Vec<Option<Scalar>>>;
+
+/// A header with doubles in the place of integers of 64 bits, and where these were.
+fn without_wide(text: &str) -> (String, Wide) {
+    let (mut known, mut wide) = (String::with_capacity(text.len()), Vec::new());
+    for line in text.split_inclusive('\n') {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        if let ["property", types @ .., _name] = words.as_slice() {
+            let types = types.strip_prefix(&["list"]).unwrap_or(types);
+            let found: Vec<Option<Scalar>> = types.iter().map(|word| Scalar::wide(word)).collect();
+            if found.iter().any(Option::is_some) {
+                let double = |word| if Scalar::wide(word).is_some() { "double" } else { word };
+                let (name, before) = words.split_last().unwrap_or((&"", &[]));
+                let before: Vec<&str> = before.iter().map(|word| double(word)).collect();
+                known += &format!("{} {name}\n", before.join(" "));
+            } else {
+                known += line;
+            }
+            wide.push(found);
+        } else {
+            known += line;
+        }
+    }
+    (known, wide)
+}
+
+/// Gives properties the integers of 64 bits that the parser has read as doubles.
+fn widen(elements: &mut [Element], wide: &Wide) {
+    let properties = elements.iter_mut().flat_map(|element| &mut element.properties);
+    for (property, wide) in properties.zip(wide) {
+        match (&mut property.shape, wide.as_slice()) {
+            (Shape::Scalar(scalar), [Some(wide)]) => *scalar = *wide,
+            (Shape::List { count, item }, [of_count, of_item]) => {
+                (*count, *item) = (of_count.unwrap_or(*count), of_item.unwrap_or(*item));
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Splits a file after its `end_header` line. The lines of a header end as its first one does, in an old file with a carriage
+/// return alone.
 fn split(bytes: &[u8]) -> Result<(String, &[u8]), FormatError> {
     if !bytes.starts_with(b"ply") {
         return Err(FormatError::at("byte 0", "this is not a PLY file", "check its extension"));
     }
+    let first = bytes.iter().position(|byte| matches!(byte, b'\n' | b'\r')).unwrap_or(0);
+    let is_old = bytes[first..].starts_with(b"\r") && !bytes[first..].starts_with(b"\r\n");
+    let line_end = if is_old { b'\r' } else { b'\n' };
     let mut end = 0;
-    for line in bytes.split_inclusive(|&byte| byte == b'\n') {
+    for line in bytes.split_inclusive(|&byte| byte == line_end) {
         end += line.len();
         if line.trim_ascii_end() == b"end_header" {
             let (header, body) = bytes.split_at(end);
-            return Ok((String::from_utf8_lossy(header).into_owned(), body));
+            let text = String::from_utf8_lossy(header);
+            return Ok((if is_old { text.replace('\r', "\n") } else { text.into_owned() }, body));
         }
     }
     Err(FormatError::at(

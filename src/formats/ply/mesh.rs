@@ -13,7 +13,8 @@ use crate::geometry::mesh::LabelBuilder;
 
 /// Reads the `vertex` and `face` elements of a PLY file.
 ///
-/// Polygons become fans of triangles round their first corner. Every integer property of the faces
+/// Polygons become fans of triangles round their first corner; faces of one or two corners are no surface and are skipped. Strips
+/// of triangles (`tristrips`) are read, too, in which -1 begins another strip. Every integer property of the faces
 /// becomes labels named for it, with the decimal values as names. A file without faces gives a mesh
 /// without facets.
 ///
@@ -25,7 +26,7 @@ pub fn read_mesh(bytes: &[u8]) -> Result<Mesh, FormatError> {
     let header = Header::read(bytes)?;
     let vertices = header.element("vertex").map_or(0, |element| element.count);
     let mut body = Body::new(&header, bytes.len());
-    let mut mesh = Mesh::default();
+    let (mut mesh, mut strips, mut thin) = (Mesh::default(), Vec::new(), None);
     for element in &header.elements {
         match element.name.as_str() {
             "vertex" => mesh.vertices = read_vertices(&mut body, element)?,
@@ -37,13 +38,64 @@ pub fn read_mesh(bytes: &[u8]) -> Result<Mesh, FormatError> {
                 }
                 let mut faces = Faces::new(element, vertices, bytes.len());
                 body.for_each_row(element, list, |n, row| faces.push(n, row))?;
-                mesh.facets = faces.facets;
+                (mesh.facets, thin) = (faces.facets, faces.thin);
                 mesh.labels = faces.labels.into_iter().map(|(_, l)| l.finish()).collect();
+            }
+            "tristrips" => {
+                let list = corner_list(element)?;
+                body.for_each_row(element, list, |n, row| strip(&mut strips, vertices, n, row))?;
             }
             _ => body.skip(element)?,
         }
     }
+    // In a damaged binary file a wrong number of corners shifts all that follows.
+    if let Some((face, corners)) = thin.filter(|_| body.has_more_bytes()) {
+        return Err(FormatError::at(
+            format!("face {face}"),
+            format!("has {corners} corners, and bytes are left over at the end"),
+            "repair or export the mesh again",
+        ));
+    }
+    mesh.push_unnamed(&strips);
     Ok(mesh)
+}
+
+/// The triangles of strips, of which every other one runs the other way round.
+fn strip(
+    facets: &mut Vec<[u32; 3]>,
+    vertices: usize,
+    number: usize,
+    row: &Row,
+) -> Result<(), FormatError> {
+    for strip in row.list.split(|corner| *corner == -1.0) {
+        let mut corners = Vec::with_capacity(strip.len());
+        for &corner in strip {
+            let index = vertex(corner, vertices)
+                .ok_or_else(|| no_such_vertex("tristrips", number, corner, vertices))?;
+            corners.push(index);
+        }
+        let triangles = corners.windows(3).enumerate().map(|(at, three)| match *three {
+            [a, b, c] if at % 2 == 1 => [b, a, c],
+            [a, b, c] => [a, b, c],
+            _ => [0; 3],
+        });
+        facets.extend(triangles.filter(|[a, b, c]| a != b && b != c && c != a));
+    }
+    Ok(())
+}
+
+/// The number of a vertex, if there is such a one.
+fn vertex(corner: f64, vertices: usize) -> Option<u32> {
+    let index = corner as u32;
+    (f64::from(index) == corner && (index as usize) < vertices).then_some(index)
+}
+
+fn no_such_vertex(what: &str, number: usize, corner: f64, vertices: usize) -> FormatError {
+    FormatError::at(
+        format!("{what} {number}"),
+        format!("refers to vertex {corner}, but the file has {vertices} vertices"),
+        "repair or export the mesh again",
+    )
 }
 
 fn read_vertices(body: &mut Body, element: &Element) -> Result<Vec<DVec3>, FormatError> {
@@ -68,7 +120,7 @@ fn corner_list(element: &Element) -> Result<Option<usize>, FormatError> {
     if at.is_none() && element.count > 0 {
         return Err(FormatError::at(
             "header",
-            "element face has no list called vertex_indices or vertex_index",
+            format!("element {} has no list called vertex_indices or vertex_index", element.name),
             "export the mesh as triangles",
         ));
     }
@@ -79,6 +131,8 @@ fn corner_list(element: &Element) -> Result<Option<usize>, FormatError> {
 struct Faces {
     vertices: usize,
     facets: Vec<[u32; 3]>,
+    /// The first face of fewer than three corners, and their number.
+    thin: Option<(usize, usize)>,
     /// Each with the place of its property.
     labels: Vec<(usize, LabelBuilder)>,
     most_labels: usize,
@@ -100,6 +154,7 @@ impl Faces {
         Faces {
             vertices,
             facets: Vec::with_capacity(element.count),
+            thin: None,
             labels: labels.collect(),
             most_labels: file_bytes.saturating_mul(Faces::LABELS_PER_BYTE),
             text: String::new(),
@@ -108,34 +163,21 @@ impl Faces {
 
     fn push(&mut self, face: usize, row: &Row) -> Result<(), FormatError> {
         let corners = row.list.as_slice();
-        let [first, second, others @ ..] = corners else {
-            return Err(too_few_corners(face, corners.len()));
-        };
-        if others.is_empty() {
-            return Err(too_few_corners(face, corners.len()));
+        if let Some(&stray) =
+            corners.iter().find(|&&corner| vertex(corner, self.vertices).is_none())
+        {
+            return Err(no_such_vertex("face", face, stray, self.vertices));
         }
-        if let Some(&stray) = corners.iter().find(|&&corner| !self.is_vertex(corner)) {
-            return Err(self.no_such_vertex(face, stray));
+        if corners.len() < 3 {
+            self.thin.get_or_insert((face, corners.len()));
         }
+        let [first, second, others @ ..] = corners else { return Ok(()) };
         let mut previous = *second;
         for &next in others {
             self.facets.push([*first as u32, previous as u32, next as u32]);
             previous = next;
         }
         self.label(face, &row.scalars, others.len())
-    }
-
-    fn is_vertex(&self, corner: f64) -> bool {
-        let index = corner as u32;
-        f64::from(index) == corner && (index as usize) < self.vertices
-    }
-
-    fn no_such_vertex(&self, face: usize, corner: f64) -> FormatError {
-        FormatError::at(
-            format!("face {face}"),
-            format!("refers to vertex {corner}, but the file has {} vertices", self.vertices),
-            "repair or export the mesh again",
-        )
     }
 
     fn label(&mut self, face: usize, scalars: &[f64], facets: usize) -> Result<(), FormatError> {
@@ -154,14 +196,6 @@ impl Faces {
         }
         Ok(())
     }
-}
-
-fn too_few_corners(face: usize, corners: usize) -> FormatError {
-    FormatError::at(
-        format!("face {face}"),
-        format!("has {corners} corners, and a surface needs 3"),
-        "repair or export the mesh again",
-    )
 }
 
 #[cfg(test)]
@@ -273,7 +307,11 @@ mod tests {
         let problem = |at, byte| altered(at, byte).unwrap_err().to_string();
         assert!(problem(face(7) + 1, 16).starts_with("face 7: refers to vertex 16, but the file"));
         assert!(problem(face(9) + 12, 255).starts_with("face 9: refers to vertex -16"));
-        assert!(problem(face(3), 2).starts_with("face 3: has 2 corners"));
+        assert!(problem(face(3), 2).starts_with("face "));
+        let thin = [&good[..face(17)], &[2], &good[face(17) + 1..]].concat();
+        let problem_of = |bytes: &[u8]| read_mesh(bytes).unwrap_err().to_string();
+        assert!(problem_of(&thin).starts_with("face 17: has 2 corners, and bytes are left over"));
+        assert_eq!(read_mesh(&thin[..thin.len() - 4]).unwrap().facets.len(), 17);
         assert!(problem(face(17), 4).starts_with(&format!("byte {}: the file ends", good.len())));
         assert!(read_mesh(&good[..good.len() - 1]).is_err());
         // Four corners on the way, and the file is as long as it must be.
@@ -281,6 +319,40 @@ mod tests {
         quad[face(0)] = 4;
         quad.splice(face(1)..face(1), 0u32.to_le_bytes());
         assert_eq!(read_mesh(&quad).unwrap().facets.len(), 19);
+    }
+
+    #[test]
+    fn other_peoples_ways_to_write_a_mesh() {
+        let plain = ascii("property list uchar int vertex_index\n", &["3 0 1 2", "3 0 2 3"]);
+        let expected = read_mesh(plain.as_bytes()).unwrap();
+        let wrapped = plain.replace("3 0 2 3", "3\n0 2\n3").replace("1 1 0", "1\n1 0");
+        let wide = plain.replace("uchar int vertex", "int64 uint64 vertex");
+        let thin = plain.replace("element face 2", "element face 3") + "2 0 1\n";
+        for text in [format!("\u{feff}{plain}"), plain.replace('\n', "\r"), wrapped, wide, thin] {
+            assert_eq!(read_mesh(text.as_bytes()).unwrap(), expected, "{text}");
+        }
+        let strips = ascii("property list uchar int vertex_index\n", &["7 3 0 2 1 -1 0 1"]);
+        let strips = strips.replace("element face", "element tristrips");
+        let facets = [[3, 0, 2], [2, 0, 1]];
+        assert_eq!(read_mesh(strips.as_bytes()).unwrap().facets, facets);
+        let beyond = strips.replace("2 1 -1", "2 4 -1");
+        assert!(message(&beyond).starts_with("tristrips 0: refers to vertex 4, but"));
+    }
+
+    #[test]
+    fn integers_of_64_bits_in_binary() {
+        let properties = "element vertex 3\nproperty double x\nproperty double y\nproperty double z\n\
+                          element face 1\nproperty list uchar int64 vertex_indices\nproperty int64 part\n";
+        let body = |part: i64| -> Vec<u8> {
+            let numbers = [0.0, 0.5, -1.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.25f64];
+            let vertices = numbers.iter().flat_map(|x| x.to_le_bytes());
+            let face = [2_i64, 1, 0, part].into_iter().flat_map(i64::to_le_bytes);
+            vertices.chain([3]).chain(face).collect()
+        };
+        let mesh = read_mesh(&binary("little", properties, &body(-7))).unwrap();
+        assert_eq!((mesh.facets[0], mesh.labels[0].names[0].as_str()), ([2, 1, 0], "-7"));
+        // A double does not hold it.
+        assert!(read_mesh(&binary("little", properties, &body(i64::MAX))).is_err());
     }
 
     #[test]
@@ -346,7 +418,7 @@ mod tests {
             "face 1: refers to vertex -2, but the file has 4 vertices; \
              repair or export the mesh again"
         );
-        let bad = ["3 0 1 4", "3 4000000000 1 2", "3 0 1.5 2", "2 0 1", "0"];
+        let bad = ["3 0 1 4", "3 4000000000 1 2", "3 0 1.5 2", "2 0 4"];
         for face in bad {
             let text = ascii("property list uchar double vertex_indices\n", &["3 0 1 2", face]);
             assert!(message(&text).starts_with("face 1: "), "{face}: {}", message(&text));
@@ -359,17 +431,21 @@ mod tests {
         let too_long = ascii(properties, &["3 0 1 2", "3 0 1 2 3"]);
         let too_short = ascii(properties, &["3 0 1 2", "3 0 1"]);
         let no_number = ascii(properties, &["3 0 1 2", "3 0 1 two"]);
-        for text in [too_long, too_short, no_number] {
+        for text in [too_long, no_number] {
             assert_eq!(
                 message(&text),
                 "line 17: face 1 does not follow the header; copy or export the file again"
             );
         }
-        let cut = ascii(properties, &["3 0 1 2", "3"]);
-        assert_eq!(
-            message(cut.trim_end()),
-            "line 17: the file ends inside face 1; copy or export the file again"
-        );
+        for text in [ascii(properties, &["3 0 1 2", "3"]), too_short] {
+            assert_eq!(
+                message(&text),
+                "line 17: the file ends inside face 1; copy or export the file again"
+            );
+        }
+        // A row that lacks a number takes the first of the next, which then is too long.
+        let short = ascii(properties, &["3 0 1", "3 0 1 2"]);
+        assert!(message(&short).starts_with("line 16: face 0 does not follow"));
     }
 
     #[test]

@@ -149,6 +149,8 @@ fn put(bytes: &mut Vec<u8>, scalar: Scalar, value: f64) {
         Scalar::UInt => bytes.extend((value as u32).to_le_bytes()),
         Scalar::Float => bytes.extend((value as f32).to_le_bytes()),
         Scalar::Double => bytes.extend(value.to_le_bytes()),
+        Scalar::Long => bytes.extend((value as i64).to_le_bytes()),
+        Scalar::ULong => bytes.extend((value as u64).to_le_bytes()),
     }
 }
 
@@ -173,6 +175,8 @@ mod tests {
                 column("step", Scalar::Short, &[-32768.0, 32767.0, 7.0]),
                 column("flag", Scalar::UChar, &[0.0, 255.0, 7.0]),
                 column("sign", Scalar::Char, &[-128.0, 127.0, 7.0]),
+                column("label", Scalar::Long, &[-9007199254740992.0, 0.0, 7.0]),
+                column("serial", Scalar::ULong, &[9007199254740992.0, 0.0, 7.0]),
             ],
         }
     }

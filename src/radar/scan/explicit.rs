@@ -12,6 +12,10 @@ use crate::radar::mirror::MirrorAngles;
 /// A direction this near to unit length was meant to be one.
 const UNIT_LENGTH: f64 = 1e-6;
 
+/// What `matdb radar` writes of each chirp beside its number.
+const WRITTEN: [&str; 11] =
+    ["time_s", "gamma_rad", "phi_rad", "xt_m", "yt_m", "ox_m", "oy_m", "oz_m", "dx", "dy", "dz"];
+
 /// Reads `chirp,ox_m,oy_m,oz_m,dx,dy,dz` and, where it is there, `time_s`; the mirror's angles stay empty.
 pub(super) fn rays(file: &str, bytes: &[u8]) -> Result<Chirps, RadarError> {
     let columns = ["chirp", "ox_m", "oy_m", "oz_m", "dx", "dy", "dz"];
@@ -63,7 +67,8 @@ fn read(
     mut rest: impl FnMut(&Table, usize, &mut Chirps) -> Result<(), FormatError>,
 ) -> Result<Chirps, RadarError> {
     let at = |error| RadarError::Explicit { file: file.to_owned(), error };
-    let table = Table::read(bytes, columns, &["time_s"]).map_err(at)?;
+    let others: Vec<&str> = WRITTEN.into_iter().filter(|name| !columns.contains(name)).collect();
+    let table = Table::read(bytes, columns, &others).map_err(at)?;
     let mut chirps = Chirps::default();
     let has_times = table.has("time_s");
     for row in 0..table.len() {
@@ -116,6 +121,15 @@ mod tests {
         let text = "chirp,time_s,gamma_rad,phi_rad\n0,0,0.01,3\n";
         let chirps = angles("angles.csv", text.as_bytes()).unwrap();
         assert_eq!(chirps.mirror, [MirrorAngles { gamma_rad: 0.01, phi_rad: 3.0 }]);
+    }
+
+    #[test]
+    fn what_the_program_writes_is_read_as_rays_and_as_angles() {
+        let text = "chirp,time_s,gamma_rad,phi_rad,xt_m,yt_m,ox_m,oy_m,oz_m,dx,dy,dz\n\
+                    0,0,0.01,3,0.1,0.2,0,1.1,8,0,0,-1\n";
+        assert_eq!(rays("scan.csv", text.as_bytes()).unwrap().rays[0].direction.xyz(), -DVec3::Z);
+        let found = angles("scan.csv", text.as_bytes()).unwrap().mirror;
+        assert_eq!(found, [MirrorAngles { gamma_rad: 0.01, phi_rad: 3.0 }]);
     }
 
     #[test]
