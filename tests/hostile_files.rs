@@ -3,6 +3,8 @@
 //! Valid files are damaged at random, files are built to be as greedy as their format allows, and a
 //! counting allocator watches over both.
 
+#![allow(unsafe_code)]
+
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 

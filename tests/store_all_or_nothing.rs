@@ -7,6 +7,8 @@
 //! Faults come through SQLite's own hooks, which an automatic extension puts on every connection
 //! that the library opens; the library needs no hook for it.
 
+#![allow(unsafe_code)]
+
 mod support;
 
 use std::cell::Cell;

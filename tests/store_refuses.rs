@@ -1,6 +1,8 @@
 //! What is not a sound, writable database of ours is refused with one clear sentence that names the
 //! file, and what is not ours is left as it was, byte for byte.
 
+#![allow(unsafe_code)]
+
 use std::ffi::{c_char, c_int};
 use std::fs::{self, Permissions};
 use std::os::unix::fs::{MetadataExt, PermissionsExt};

@@ -1,5 +1,7 @@
 //! Loops that are compiled once per width of vector instructions, and run at the widest that the processor has.
 
+#![allow(unsafe_code)]
+
 /// A computation of plain loops over arrays of fixed length, which the compiler turns into vector instructions.
 ///
 /// It must not fuse products with sums (FMA), so that every width gives the same bits.

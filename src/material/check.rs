@@ -6,7 +6,7 @@ use super::curve::{Censor, Curve, Observation};
 use super::error::{MaterialError, dangling, value};
 use super::fit::{Covariance, Fit};
 use super::instrument::Instrument;
-use super::number_check::NumberCheck;
+use super::number_check::{MOST, NumberCheck, is_level, is_number};
 use super::provenance::{Session, Source};
 use super::revision::Material;
 use crate::formats::EffectEntry;
@@ -60,7 +60,7 @@ impl Material {
     }
 
     fn check_limits(&self) -> Result<(), MaterialError> {
-        if !is_range_within(self.frequency_hz, f64::MIN_POSITIVE, f64::MAX) {
+        if !is_range_within(self.frequency_hz, MOST.recip(), MOST) {
             let problem = "must be two positive frequencies, the lower first";
             return Err(value("frequency_ghz", problem, "mend the range"));
         }
@@ -124,9 +124,9 @@ impl Material {
         unique("effect", self.effects.iter().map(|effect| effect.name.as_str()))?;
         for EffectEntry { name, source, parameters } in &self.effects {
             self.check_own_source(&format!("effect `{name}`"), source.as_ref())?;
-            if let Some((key, number)) = parameters.iter().find(|(_, v)| !v.is_finite()) {
+            if let Some((key, number)) = parameters.iter().find(|(_, v)| !is_number(**v)) {
                 let place = format!("effect `{name}`");
-                let problem = format!("{key} = {number} is not a finite number");
+                let problem = format!("{key} = {number} is not a number within ±1e100");
                 return Err(value(&place, &problem, "mend the number"));
             }
         }
@@ -188,12 +188,12 @@ impl Observation {
         if !quarter.contains(&self.theta_i_rad) || !quarter.contains(&self.theta_r_rad) {
             return Err(value(place, "the angle is not within 0–90°", "mend the angle"));
         }
-        if !self.delta_phi_rad.is_finite() {
-            return Err(value(place, "the azimuth is not finite", "mend the angle"));
+        if !is_number(self.delta_phi_rad) {
+            return Err(value(place, "the azimuth is no angle", "mend the angle"));
         }
         let mut levels = [self.sigma0, self.threshold_sigma0].into_iter().flatten();
-        if levels.any(|level| !(level > 0.0 && level.is_finite())) {
-            return Err(value(place, "σ⁰ is not a positive number", "give a finite level in dB"));
+        if levels.any(|level| !is_level(level)) {
+            return Err(value(place, "σ⁰ is not within ±1000 dB", "give a finite level in dB"));
         }
         self.check_circumstances(place)?;
         match (self.censor, self.sigma0, self.threshold_sigma0) {
@@ -216,13 +216,14 @@ impl Observation {
             let problem = "the angle's deviation is not within 0–90°";
             return Err(value(place, problem, "mend it or leave it out"));
         }
-        if self.power_w.is_some_and(|power_w| !(power_w > 0.0 && power_w.is_finite())) {
-            return Err(value(place, "the power is not positive", "give a finite level in dBm"));
+        if self.power_w.is_some_and(|power_w| !is_level(power_w)) {
+            let problem = "the power is not within ±1000 dB of 1 W";
+            return Err(value(place, problem, "give a finite level in dBm"));
         }
-        if self.range_m.is_some_and(|range_m| !(range_m >= 0.0 && range_m.is_finite())) {
-            return Err(value(place, "the range is negative", "mend it or leave it out"));
+        if self.range_m.is_some_and(|range_m| !(range_m >= 0.0 && is_number(range_m))) {
+            return Err(value(place, "the range is no length", "mend it or leave it out"));
         }
-        if self.target_m.is_some_and(|[xt_m, yt_m]| !(xt_m.is_finite() && yt_m.is_finite())) {
+        if self.target_m.is_some_and(|place_m| !place_m.into_iter().all(is_number)) {
             return Err(value(place, "the place is not finite", "mend it or leave it out"));
         }
         Ok(())

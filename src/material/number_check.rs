@@ -2,6 +2,19 @@
 
 use super::error::{MaterialError, value};
 
+/// Largest number of a material, and 1 over the least positive one: levels of ±1000 dB. Beyond, units and decibels overflow.
+pub(super) const MOST: f64 = 1e100;
+
+/// Whether a number is finite and within ±[`MOST`].
+pub(super) fn is_number(x: f64) -> bool {
+    x.abs() <= MOST
+}
+
+/// Whether a number is positive and within ±1000 dB.
+pub(super) fn is_level(x: f64) -> bool {
+    (MOST.recip()..=MOST).contains(&x)
+}
+
 /// Checks the numbers of one place against their ranges.
 #[derive(Clone, Copy)]
 pub(super) struct NumberCheck<'a> {
@@ -20,7 +33,7 @@ impl<'a> NumberCheck<'a> {
         what: &str,
         numbers: impl IntoIterator<Item = f64>,
     ) -> Result<(), MaterialError> {
-        self.all(what, "is not positive", numbers, |x| x > 0.0)
+        self.all(what, "is not positive, 1e-100 at least", numbers, |x| x >= MOST.recip())
     }
 
     /// Refuses numbers below 0.
@@ -42,7 +55,7 @@ impl<'a> NumberCheck<'a> {
         self.all(what, &format!("is below {least}"), numbers, |x| x >= least)
     }
 
-    /// Refuses infinite numbers and NaN.
+    /// Refuses infinite numbers, NaN and those beyond ±[`MOST`], as do all others.
     pub fn finite(
         self,
         what: &str,
@@ -68,9 +81,11 @@ impl<'a> NumberCheck<'a> {
         numbers: impl IntoIterator<Item = f64>,
         good: impl Fn(f64) -> bool,
     ) -> Result<(), MaterialError> {
-        if numbers.into_iter().all(|x| x.is_finite() && good(x)) {
+        let Some(bad) = numbers.into_iter().find(|&x| !is_number(x) || !good(x)) else {
             return Ok(());
-        }
+        };
+        let is_beyond = bad.is_finite() && !is_number(bad);
+        let problem = if is_beyond { "is beyond 1e100" } else { problem };
         Err(value(self.place, &format!("{what} {problem}"), "mend it or leave it out"))
     }
 }

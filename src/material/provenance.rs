@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::bidirectional::turns_the_line;
 use super::error::{MaterialError, value};
 use super::form::{is_date, is_hash};
-use super::number_check::NumberCheck;
+use super::number_check::{NumberCheck, is_number};
 
 /// Where numbers come from.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -306,6 +306,6 @@ impl SessionPose {
         let [x, y, z] = self.rotation_rows.map(glam::DVec3::from_array);
         let unit = [x, y, z].iter().all(|row| (row.length() - 1.0).abs() < ROUNDING);
         let right_handed = (x.cross(y) - z).length() < ROUNDING;
-        unit && right_handed && self.translation_m.iter().all(|shift_m| shift_m.is_finite())
+        unit && right_handed && self.translation_m.into_iter().all(is_number)
     }
 }

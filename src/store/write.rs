@@ -276,15 +276,19 @@ fn revision(
     let material_id: i64 = tx
         .prepare_cached(upsert)?
         .query_row(params![material.slug.as_str(), number], |row| row.get(0))?;
+    // A clock may be wrong: no revision is older than an earlier one, and no year has five digits.
     let insert = format!(
         "INSERT INTO revision ({CONTENT}, material_id, number, content_hash, program_version, added_at)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, strftime('%Y-%m-%dT%H:%M:%SZ', 'now'))"
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, max(
+             coalesce(strftime('%Y-%m-%dT%H:%M:%SZ', 'now'), '9999-12-31T23:59:59Z'),
+             coalesce((SELECT max(added_at) FROM revision WHERE material_id = ?), '')))"
     );
-    let own: [Value; 4] = [
+    let own: [Value; 5] = [
         material_id.into(),
         number.into(),
         hash.to_owned().into(),
         env!("CARGO_PKG_VERSION").to_owned().into(),
+        material_id.into(),
     ];
     let values = content(material)?.into_iter().chain(own);
     let revision_id = tx.prepare_cached(&insert)?.insert(params_from_iter(values))?;

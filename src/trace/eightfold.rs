@@ -3,6 +3,8 @@
 //! Facets are culled conservatively in f32, with a bound of the rounding; f64 decides the few survivors (`facet.rs`).
 //! The triangle test of `obvhs` is not used, because it loses rays on shared edges.
 
+#![allow(unsafe_code)]
+
 use super::boxes::{Boxes, PADDING, Sphere};
 use super::facet::{Line, plane_hit};
 use super::hit::Hit;

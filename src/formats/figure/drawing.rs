@@ -7,9 +7,11 @@
 use std::fmt::Write;
 use std::iter::repeat_n;
 
+use skrifa::instance::{LocationRef, Size};
+use skrifa::outline::{DrawSettings, OutlinePen};
+use skrifa::{FontRef, GlyphId, MetadataProvider};
 use thiserror::Error;
 use tiny_skia::{FillRule, Paint, Path, PathBuilder, PathSegment, Pixmap, Stroke, Transform};
-use ttf_parser::{Face, OutlineBuilder};
 
 /// Pixels per metre of paper written into the PNG: 200 per inch.
 const PIXELS_PER_M: u32 = 7874;
@@ -218,21 +220,36 @@ impl Drawing {
 
 /// Length of a line of text, px.
 pub fn text_width_px(text: &str, size_px: f32, weight: Weight) -> f32 {
-    let face = face(weight);
-    let units: u32 = text.chars().map(|letter| u32::from(advance(&face, letter))).sum();
-    units as f32 * size_px / f32::from(face.units_per_em())
+    let font = font(weight);
+    let units: f32 = text.chars().map(|letter| advance(&font, glyph(&font, letter))).sum();
+    units * size_px / units_per_em(&font)
 }
 
-fn face(weight: Weight) -> Face<'static> {
+fn font(weight: Weight) -> FontRef<'static> {
     let font: &[u8] = match weight {
         Weight::Regular => include_bytes!("../../../assets/inter/Inter-Regular.otf"),
         Weight::SemiBold => include_bytes!("../../../assets/inter/Inter-SemiBold.otf"),
     };
-    Face::parse(font, 0).expect("the fonts in assets/ are valid")
+    FontRef::new(font).expect("the fonts in assets/ are valid")
 }
 
-fn advance(face: &Face, letter: char) -> u16 {
-    face.glyph_hor_advance(face.glyph_index(letter).unwrap_or_default()).unwrap_or(0)
+/// For outlines and widths in the font's own units.
+fn own_units() -> (Size, LocationRef<'static>) {
+    (Size::unscaled(), LocationRef::default())
+}
+
+fn units_per_em(font: &FontRef) -> f32 {
+    let (size, location) = own_units();
+    f32::from(font.metrics(size, location).units_per_em)
+}
+
+fn glyph(font: &FontRef, letter: char) -> GlyphId {
+    font.charmap().map(letter).unwrap_or_default()
+}
+
+fn advance(font: &FontRef, glyph: GlyphId) -> f32 {
+    let (size, location) = own_units();
+    font.glyph_metrics(size, location).advance_width(glyph).unwrap_or(0.0)
 }
 
 fn paint(page: &mut Pixmap, shape: &Shape) {
@@ -309,8 +326,8 @@ fn paint_text(page: &mut Pixmap, text: &Text) {
 
 /// The outlines of a text whose anchor is at the origin, px.
 fn letters(text: &Text) -> Option<Path> {
-    let face = face(text.weight);
-    let scale = text.size_px / f32::from(face.units_per_em());
+    let font = font(text.weight);
+    let scale = text.size_px / units_per_em(&font);
     let before_anchor = match text.anchor {
         Anchor::Start => 0.0,
         Anchor::Middle => 0.5,
@@ -318,9 +335,15 @@ fn letters(text: &Text) -> Option<Path> {
     };
     let x = -before_anchor * text_width_px(&text.text, text.size_px, text.weight);
     let mut pen = Pen { path: PathBuilder::new(), x, scale };
+    let outlines = font.outline_glyphs();
     for letter in text.text.chars() {
-        face.outline_glyph(face.glyph_index(letter).unwrap_or_default(), &mut pen);
-        pen.x += scale * f32::from(advance(&face, letter));
+        let glyph = glyph(&font, letter);
+        if let Some(outline) = outlines.get(glyph) {
+            let (size, location) = own_units();
+            let drawn = outline.draw(DrawSettings::unhinted(size, location), &mut pen);
+            drawn.expect("the fonts in assets/ are valid");
+        }
+        pen.x += scale * advance(&font, glyph);
     }
     pen.path.finish()
 }
@@ -338,7 +361,7 @@ impl Pen {
     }
 }
 
-impl OutlineBuilder for Pen {
+impl OutlinePen for Pen {
     fn move_to(&mut self, x: f32, y: f32) {
         let (x, y) = self.to_page(x, y);
         self.path.move_to(x, y);

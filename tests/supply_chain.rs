@@ -1,0 +1,88 @@
+//! Promise: every crate that the program may have is under a licence that `deny.toml` allows, from the registry that it names,
+//! and none that it bans.
+
+use std::process::Command;
+
+use serde_json::Value;
+use toml::Table;
+
+use crate::support::root;
+
+/// Whether one way to read an SPDX expression has allowed licences alone.
+fn is_allowed(expression: &str, allowed: &[&str]) -> bool {
+    let spaced = expression.replace('/', " OR ").replace('(', " ( ").replace(')', " ) ");
+    let words: Vec<&str> = spaced.split_whitespace().collect();
+    let (is_allowed, rest) = either(&words, allowed);
+    assert!(rest.is_empty(), "{expression} is not understood");
+    is_allowed
+}
+
+fn either<'a>(words: &'a [&'a str], allowed: &[&str]) -> (bool, &'a [&'a str]) {
+    let (mut holds, mut rest) = both(words, allowed);
+    while let Some(("OR", after)) = rest.split_first().map(|(word, after)| (*word, after)) {
+        let (other, after) = both(after, allowed);
+        (holds, rest) = (holds | other, after);
+    }
+    (holds, rest)
+}
+
+fn both<'a>(words: &'a [&'a str], allowed: &[&str]) -> (bool, &'a [&'a str]) {
+    let (mut holds, mut rest) = one(words, allowed);
+    while let Some(("AND", after)) = rest.split_first().map(|(word, after)| (*word, after)) {
+        let (other, after) = one(after, allowed);
+        (holds, rest) = (holds & other, after);
+    }
+    (holds, rest)
+}
+
+fn one<'a>(words: &'a [&'a str], allowed: &[&str]) -> (bool, &'a [&'a str]) {
+    match words {
+        ["(", inside @ ..] => {
+            let (holds, rest) = either(inside, allowed);
+            assert_eq!(rest.first(), Some(&")"), "a parenthesis is open");
+            (holds, &rest[1..])
+        }
+        // An exception only adds rights.
+        [licence, "WITH", _, rest @ ..] | [licence, rest @ ..] => (allowed.contains(licence), rest),
+        [] => panic!("the expression ends early"),
+    }
+}
+
+#[test]
+fn licences_sources_and_bans_are_those_of_the_list() {
+    let rules: Table = std::fs::read_to_string(root().join("deny.toml")).unwrap().parse().unwrap();
+    let list = |table: &str, key: &str| -> Vec<&str> {
+        rules[table][key].as_array().unwrap().iter().map(|word| word.as_str().unwrap()).collect()
+    };
+    let (licences, banned) = (list("licenses", "allow"), list("bans", "deny"));
+    let registries = list("sources", "allow-registry");
+    let metadata = Command::new(env!("CARGO"))
+        .args(["metadata", "--offline", "--all-features", "--format-version", "1"])
+        .current_dir(root())
+        .output()
+        .unwrap();
+    assert!(metadata.status.success(), "{}", String::from_utf8_lossy(&metadata.stderr));
+    let metadata: Value = serde_json::from_slice(&metadata.stdout).unwrap();
+    let packages = metadata["packages"].as_array().unwrap();
+    assert!(packages.len() > 100, "{} packages", packages.len());
+    for package in packages {
+        let name = package["name"].as_str().unwrap();
+        let licence = package["license"].as_str().unwrap_or("no licence");
+        assert!(is_allowed(licence, &licences), "{name} is under {licence}");
+        assert!(!banned.contains(&name), "{name} is banned");
+        let source =
+            package["source"].as_str().map(|source| source.trim_start_matches("registry+"));
+        assert!(source.is_none_or(|source| registries.contains(&source)), "{name}: {source:?}");
+    }
+}
+
+#[test]
+fn an_expression_is_read_as_spdx_has_it() {
+    let allowed = ["MIT", "Zlib"];
+    for good in ["MIT", "MIT/GPL-3.0", "GPL-3.0 OR (MIT AND Zlib)", "MIT WITH LLVM-exception"] {
+        assert!(is_allowed(good, &allowed), "{good}");
+    }
+    for bad in ["GPL-3.0", "MIT AND GPL-3.0", "(MIT OR Zlib) AND GPL-3.0"] {
+        assert!(!is_allowed(bad, &allowed), "{bad}");
+    }
+}
