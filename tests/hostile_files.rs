@@ -275,12 +275,25 @@ fn greedy_files_stay_frugal() {
         let body = [vec![0; 3], (0..faces).flat_map(row).collect()].concat();
         ply("binary_little_endian", &format!("{vertex}{face}"), &body)
     };
+    let strip = |labels: usize| {
+        let labels: String = (0..labels).map(|i| format!("property int l{i}\n")).collect();
+        let vertex = vertex.replace("vertex 1", "vertex 3");
+        let list = "property list uint uchar vertex_indices\n";
+        let elements = format!("{vertex}element face 0\n{list}{labels}element tristrips 1\n{list}");
+        let corners: Vec<u8> = [0, 1, 2].repeat(SIZE_BYTES / 3);
+        let count = (corners.len() as u32).to_le_bytes();
+        let body = [&[0; 9], count.as_slice(), corners.as_slice()].concat();
+        ply("binary_little_endian", &elements, &body)
+    };
     let header = |elements: &str| ply("ascii", elements, b"");
     let files = [
         polygon(0),
         polygon(1),
         polygon(2),
         polygon(1000),
+        strip(0),
+        strip(1),
+        strip(1000),
         distinct(1, 1),
         distinct(8, 8),
         header(&repeated("comment\n")),

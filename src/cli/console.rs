@@ -57,8 +57,7 @@ impl Console {
         bar.enable_steady_tick(Duration::from_millis(100));
         bar.set_message(what);
         let has_lines = !self.quiet && !io::stderr().is_terminal();
-        let lines =
-            has_lines.then(|| Lines::begin(what, Duration::from_secs(10), |line| say(&line)));
+        let lines = has_lines.then(|| Lines::begin(what, Duration::from_secs(10), say));
         Activity { what, bar, lines }
     }
 

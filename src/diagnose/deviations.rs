@@ -16,7 +16,7 @@ use crate::fit::uncertainty::deviations;
 
 /// How far an unknown that moves the target is changed to see what ln p tells of it, in steps of its parameter.
 const MOST_STEPS: f64 = 10.0;
-/// Most unknowns that move the target for which ln p is looked at: a shift and a turn. A motion has dozens, and takes minutes.
+/// Most parameters of an effect for which ln p is looked at: a shift and a turn. A motion has dozens, and takes minutes.
 const MOST_MOVING: usize = 6;
 /// Curvature, in that of each unknown alone, which holds unknowns that the smooth parts of the surface leave free.
 const HOLD: f64 = 1e-4;
@@ -39,14 +39,11 @@ impl Problem<'_> {
         let of_cells = of_free(products_of_cells(&slopes, folds));
         let of_shots = of_free(products(&terms, [&slopes, &slopes]));
         let mut told = deviations(&of_shots);
-        let moving = space.moving();
-        if !moving.is_empty() {
+        if !space.moving().is_empty() {
             let wide = self.slopes_over(WIDE_TO_NARROW[0], space, at, [&lower, &upper], &terms);
             let both = of_free(products(&terms, [&slopes, &wide]));
             told = told::deviations(&of_shots, &both);
-            if moving.len() <= MOST_MOVING {
-                self.widen(space, at, &free, &of_shots, &mut told);
-            }
+            self.widen(space, at, &free, &of_shots, &mut told);
         }
         let inverse = of_shots.try_inverse().map(|inverse| &inverse * of_cells * &inverse);
         let mut sd = vec![f64::INFINITY; at.len()];
@@ -72,7 +69,10 @@ impl Problem<'_> {
         told: &mut [Option<f64>],
     ) {
         let [lower, upper] = space.bounds();
-        let (moving, here) = (space.moving(), self.ln_likelihood(space, at));
+        let (moving, here) = (space.moving_of(MOST_MOVING), self.ln_likelihood(space, at));
+        if moving.is_empty() {
+            return;
+        }
         let alone = products.diagonal().map(|bend| bend.max(f64::MIN_POSITIVE).sqrt().recip());
         let together = self.moving_together(space, at, free, &alone);
         let mut least = vec![0.0; free.len()];

@@ -125,11 +125,16 @@ impl<'a> Space<'a> {
 
     /// Unknowns of the effects that move the target.
     pub fn moving(&self) -> Vec<usize> {
+        self.moving_of(usize::MAX)
+    }
+
+    /// Those of effects with no more than so many parameters.
+    pub fn moving_of(&self, most: usize) -> Vec<usize> {
         let mut first = self.base_len();
         let mut moving = Vec::new();
         for effect in &self.effects {
             let next = first + effect.parameters().len();
-            if effect.moves() {
+            if effect.moves() && effect.parameters().len() <= most {
                 moving.extend(first..next);
             }
             first = next;

@@ -87,7 +87,7 @@ impl Claim {
         let least_gains = if is_small { LEAST_GAINS_OF_SMALL } else { 1.0 };
         gain >= (least_gains * least).max(largest.least_gain(size.is_spread(), shots))
             && size.larger_db() >= least_size_db.max(self.share_of_size * largest.size_db)
-            && (self.counts() > standard_errors * se || is_local)
+            && (held_out > standard_errors * se || is_local)
     }
 }
 

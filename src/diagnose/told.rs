@@ -10,10 +10,12 @@ use nalgebra::DMatrix;
 const KEPT: f64 = 1.0 / 9.0;
 /// Share of the variance of an unknown that may lie along other directions, as one width tells them.
 const UNTOLD: f64 = 0.2;
-/// Deviations at which ln p is looked at, and its least fall there, half that of a normal distribution. Nearer, steps of ln p
-/// hide how it falls.
+/// Deviations at which ln p is looked at. Nearer, steps of ln p hide how it falls.
 const TESTED: f64 = 6.0;
-pub(super) const LEAST_FALL: f64 = 9.0;
+/// Share of the fall of a normal distribution that ln p must have there.
+const FALLEN: f64 = 0.5;
+/// Its fall at [`TESTED`] deviations.
+pub(super) const LEAST_FALL: f64 = FALLEN * 0.5 * TESTED * TESTED;
 /// Least eigenvalue of the scaled products of a direction that one width tells.
 const LEAST: f64 = 1e-6;
 
@@ -57,17 +59,21 @@ pub(super) fn deviations(one: &DMatrix<f64>, both: &DMatrix<f64>) -> Vec<Option<
     deviations
 }
 
-/// A standard deviation, widened until ln p falls as it promises at [`TESTED`] of it on either side; none where that is
-/// farther away than `most`. `fall` is that of ln p at a distance, with all other unknowns where they are likeliest.
+/// A standard deviation, widened until ln p falls as it promises at [`TESTED`] of it on either side, or at `most` if that is
+/// nearer; none where it does not. `fall` is that of ln p at a distance, with all other unknowns where they are likeliest.
 pub(super) fn widened(mut sd: f64, most: f64, mut fall: impl FnMut(f64) -> f64) -> Option<f64> {
-    while TESTED * sd <= most {
-        let mut is_held = |side: f64| fall(side * TESTED * sd) >= LEAST_FALL;
+    loop {
+        let away = most.min(TESTED * sd);
+        let least = FALLEN * 0.5 * (away / sd).powi(2);
+        let mut is_held = |side: f64| fall(side * away) >= least;
         if is_held(1.0) && is_held(-1.0) {
             return Some(sd);
         }
+        if away >= most {
+            return None;
+        }
         sd *= 2.0;
     }
-    None
 }
 
 #[cfg(test)]
@@ -114,6 +120,9 @@ mod tests {
         // Within a factor of √2, as half the fall is enough.
         let found = widened(0.01, 10.0, normal).unwrap();
         assert!((0.21..0.43).contains(&found), "{found}");
+        // Wide ones are looked at as far as one goes.
+        assert_eq!(widened(3.0, 10.0, |by| 0.5 * (by / 3.0).powi(2)), Some(3.0));
+        assert_eq!(widened(3.0, 10.0, |by| 0.5 * (by / 9.0).powi(2)), None);
         // Steps beside the maximum do not hold what the far side does not, and one side is not enough.
         assert_eq!(
             widened(0.01, 10.0, |by| if by.abs() > 1.0 { 3.0 } else { 4.0 * by.abs() }),

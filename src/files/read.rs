@@ -50,6 +50,7 @@ pub fn read_whole(path: &Path) -> Result<Vec<u8>, FilesError> {
             check_size(found.len(), most)?;
         }
         let mut bytes = Vec::new();
+        bytes.try_reserve_exact(found.len() as usize).map_err(io::Error::other)?;
         file.take(most + 1).read_to_end(&mut bytes)?;
         check_size(bytes.len() as u64, most)?;
         Ok(bytes)

@@ -17,8 +17,8 @@ const FACET_BYTES: usize = 50;
 /// Reads the triangles of an STL file. Corners of equal bits become one vertex.
 ///
 /// A file is binary when its length is what its count asks for, even if it begins with `solid`; behind the facets it may hold less
-/// than a facet takes, or zeros. An ascii file of several solids gets the label `solid` with their names. Its words may be on any
-/// lines, and the ends of loops, facets and solids in one word or two.
+/// than a facet takes, or zeros. An ascii file of several solids gets the label `solid` with their names. Several
+/// statements may be on one line, and the ends of loops, facets and solids in one word or two.
 ///
 /// # Errors
 ///
@@ -28,13 +28,13 @@ pub fn read_mesh(bytes: &[u8]) -> Result<Mesh, FormatError> {
     if let Some((facets, [])) = binary_facets(bytes) {
         return Ok(read_binary(facets));
     }
-    let text = line::text(bytes)?;
-    if is_text(text.as_bytes()) {
-        return read_ascii(&text);
+    if is_text(line::without_mark(bytes)) {
+        return read_ascii(&line::text(bytes)?);
     }
     match binary_facets(bytes) {
         Some((facets, rest)) if is_padding(facets, rest) => Ok(read_binary(facets)),
-        _ => Err(neither(bytes)),
+        // Of text in UTF-16 this says so.
+        _ => line::text(bytes.get(..HEADER_BYTES).unwrap_or(bytes)).and(Err(neither(bytes))),
     }
 }
 
@@ -150,16 +150,18 @@ impl AsciiReader {
                 "outer" if word(&mut rest).eq_ignore_ascii_case("loop") => {}
                 "endloop" => self.end_facet()?,
                 "endfacet" => {}
-                // Their names reach to the end of the line.
-                "solid" => {
-                    self.solid = Some(rest.to_owned());
-                    return Ok(());
-                }
+                // Their names reach to the end of the line, or to the first facet.
+                "solid" => self.solid = Some(name(&mut rest).to_owned()),
                 "endsolid" => {
                     self.solid = None;
-                    return Ok(());
+                    name(&mut rest);
                 }
                 _ => return Err(format!("{} is not STL", excerpt(statement))),
+            }
+            // Some writers add colours and numbers.
+            let next = word(&mut { rest });
+            if !KEYWORDS.iter().any(|known| next.eq_ignore_ascii_case(known)) {
+                return Ok(());
             }
         }
         Ok(())
@@ -184,6 +186,28 @@ impl AsciiReader {
         let solids = self.solids.finish();
         let labels = if solids.names.len() > 1 { vec![solids] } else { Vec::new() };
         Ok(Mesh { vertices: self.welder.vertices, facets: self.facets, labels })
+    }
+}
+
+/// Words that begin a statement.
+const KEYWORDS: [&str; 8] =
+    ["solid", "facet", "outer", "vertex", "endloop", "endfacet", "endsolid", "end"];
+
+/// The name of a solid: what is before `facet normal` or `facet outer`, which the line then begins with.
+fn name<'a>(line: &mut &'a str) -> &'a str {
+    let whole = *line;
+    loop {
+        let before = *line;
+        let mut behind = before;
+        let is_facet = word(&mut behind).eq_ignore_ascii_case("facet");
+        *line = behind;
+        let next = word(&mut behind);
+        if is_facet && ["normal", "outer"].iter().any(|known| next.eq_ignore_ascii_case(known)) {
+            *line = before;
+        } else if !line.is_empty() {
+            continue;
+        }
+        return whole[..whole.len() - line.len()].trim_end();
     }
 }
 
@@ -277,10 +301,17 @@ mod tests {
         let usual = solid("plate");
         let expected = read_mesh(usual.as_bytes()).unwrap();
         let split = usual.replace("endloop", "end loop").replace("endfacet", "end facet");
-        let joined = usual.replacen('\n', "\r", 1).replace("\n ", "  ");
-        for text in [format!("\u{feff}{usual}"), usual.replace('\n', "\r"), split, joined] {
+        let joined = usual.replace("\n ", "  ");
+        let coloured =
+            usual.replace("1 0 0\n", "1 0 0 255 0 0\n").replace("endfacet", "endfacet 7");
+        for text in [format!("\u{feff}{usual}"), usual.replace('\n', "\r"), split, joined, coloured]
+        {
             assert_eq!(read_mesh(text.as_bytes()).unwrap(), expected, "{text:?}");
         }
+        let mut line = "my facet of  facet normal 0 0 1";
+        assert_eq!((name(&mut line), line), ("my facet of", "facet normal 0 0 1"));
+        let mut line = "plate";
+        assert_eq!((name(&mut line), line), ("plate", ""));
     }
 
     #[test]

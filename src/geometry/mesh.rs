@@ -197,10 +197,14 @@ impl Mesh {
     }
 
     /// Adds facets of vertices that are there, without names.
-    pub fn push_unnamed(&mut self, facets: &[[u32; 3]]) {
-        self.facets.extend_from_slice(facets);
+    pub fn push_unnamed(&mut self, facets: Vec<[u32; 3]>) {
         for labels in &mut self.labels {
             labels.append(&FacetLabels::unnamed(&labels.property, facets.len()));
+        }
+        if self.facets.is_empty() {
+            self.facets = facets;
+        } else {
+            self.facets.extend(facets);
         }
     }
 

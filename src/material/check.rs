@@ -60,7 +60,7 @@ impl Material {
     }
 
     fn check_limits(&self) -> Result<(), MaterialError> {
-        if !is_range_within(self.frequency_hz, MOST.recip(), MOST) {
+        if !is_range_within(self.frequency_hz, f64::MIN_POSITIVE, MOST) {
             let problem = "must be two positive frequencies, the lower first";
             return Err(value("frequency_ghz", problem, "mend the range"));
         }
@@ -126,7 +126,7 @@ impl Material {
             self.check_own_source(&format!("effect `{name}`"), source.as_ref())?;
             if let Some((key, number)) = parameters.iter().find(|(_, v)| !is_number(**v)) {
                 let place = format!("effect `{name}`");
-                let problem = format!("{key} = {number} is not a number within ±1e100");
+                let problem = format!("{key} = {number} is not a number within ±1e300");
                 return Err(value(&place, &problem, "mend the number"));
             }
         }
@@ -189,11 +189,15 @@ impl Observation {
             return Err(value(place, "the angle is not within 0–90°", "mend the angle"));
         }
         if !is_number(self.delta_phi_rad) {
-            return Err(value(place, "the azimuth is no angle", "mend the angle"));
+            return Err(value(place, "the azimuth is not finite", "mend the angle"));
         }
         let mut levels = [self.sigma0, self.threshold_sigma0].into_iter().flatten();
         if levels.any(|level| !is_level(level)) {
-            return Err(value(place, "σ⁰ is not within ±1000 dB", "give a finite level in dB"));
+            return Err(value(
+                place,
+                "σ⁰ is not a positive number up to 1e300",
+                "give a finite level in dB",
+            ));
         }
         self.check_circumstances(place)?;
         match (self.censor, self.sigma0, self.threshold_sigma0) {
@@ -217,11 +221,15 @@ impl Observation {
             return Err(value(place, problem, "mend it or leave it out"));
         }
         if self.power_w.is_some_and(|power_w| !is_level(power_w)) {
-            let problem = "the power is not within ±1000 dB of 1 W";
+            let problem = "the power is not positive, or beyond 1e300 W";
             return Err(value(place, problem, "give a finite level in dBm"));
         }
         if self.range_m.is_some_and(|range_m| !(range_m >= 0.0 && is_number(range_m))) {
-            return Err(value(place, "the range is no length", "mend it or leave it out"));
+            return Err(value(
+                place,
+                "the range is negative or not finite",
+                "mend it or leave it out",
+            ));
         }
         if self.target_m.is_some_and(|place_m| !place_m.into_iter().all(is_number)) {
             return Err(value(place, "the place is not finite", "mend it or leave it out"));

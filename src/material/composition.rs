@@ -74,8 +74,8 @@ impl Layer {
     }
 }
 
-/// Largest part of a permittivity. Metals come to 10⁷ at 100 GHz.
-const MOST_PERMITTIVITY: f64 = 1e12;
+/// Largest part of a permittivity. Metals come to 10⁷ at 100 GHz, and a perfect conductor may be written by a larger one.
+const MOST_PERMITTIVITY: f64 = 1e30;
 
 impl Permittivity {
     pub(super) fn validate(&self, place: &str) -> Result<(), MaterialError> {

@@ -2,17 +2,17 @@
 
 use super::error::{MaterialError, value};
 
-/// Largest number of a material, and 1 over the least positive one: levels of ±1000 dB. Beyond, units and decibels overflow.
-pub(super) const MOST: f64 = 1e100;
+/// Largest number of a material: levels of 3000 dB. Beyond, units and decibels overflow.
+pub(super) const MOST: f64 = 1e300;
 
 /// Whether a number is finite and within ±[`MOST`].
 pub(super) fn is_number(x: f64) -> bool {
     x.abs() <= MOST
 }
 
-/// Whether a number is positive and within ±1000 dB.
+/// Whether a number is positive and no more than [`MOST`].
 pub(super) fn is_level(x: f64) -> bool {
-    (MOST.recip()..=MOST).contains(&x)
+    x > 0.0 && x <= MOST
 }
 
 /// Checks the numbers of one place against their ranges.
@@ -33,7 +33,7 @@ impl<'a> NumberCheck<'a> {
         what: &str,
         numbers: impl IntoIterator<Item = f64>,
     ) -> Result<(), MaterialError> {
-        self.all(what, "is not positive, 1e-100 at least", numbers, |x| x >= MOST.recip())
+        self.all(what, "is not positive", numbers, |x| x > 0.0)
     }
 
     /// Refuses numbers below 0.
@@ -85,7 +85,7 @@ impl<'a> NumberCheck<'a> {
             return Ok(());
         };
         let is_beyond = bad.is_finite() && !is_number(bad);
-        let problem = if is_beyond { "is beyond 1e100" } else { problem };
+        let problem = if is_beyond { "is beyond 1e300" } else { problem };
         Err(value(self.place, &format!("{what} {problem}"), "mend it or leave it out"))
     }
 }

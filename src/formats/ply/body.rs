@@ -117,8 +117,8 @@ impl<'a> Body<'a> {
             Scalar::UInt => u32::from_le_bytes(self.take()?).into(),
             Scalar::Float => f32::from_le_bytes(self.take()?).into(),
             Scalar::Double => f64::from_le_bytes(self.take()?),
-            Scalar::Long => exact(scalar, i64::from_le_bytes(self.take()?) as f64)?,
-            Scalar::ULong => exact(scalar, u64::from_le_bytes(self.take()?) as f64)?,
+            Scalar::Long => i64::from_le_bytes(self.take()?) as f64,
+            Scalar::ULong => u64::from_le_bytes(self.take()?) as f64,
         })
     }
 
@@ -182,9 +182,4 @@ impl<'a> Body<'a> {
         };
         FormatError::at(place, problem, "copy or export the file again")
     }
-}
-
-/// A 64-bit integer, if a double holds it.
-fn exact(scalar: Scalar, value: f64) -> Option<f64> {
-    scalar.holds(value).then_some(value)
 }

@@ -27,14 +27,14 @@ pub enum Scalar {
     Float,
     /// 64-bit floating point.
     Double,
-    /// 64-bit signed integer, of at most 2⁵³. Not in the format's first description.
+    /// 64-bit signed integer, rounded where it has more than 53 bits. Not in the format's first description.
     Long,
-    /// 64-bit unsigned integer, of at most 2⁵³. Not in the format's first description.
+    /// 64-bit unsigned integer, rounded where it has more than 53 bits. Not in the format's first description.
     ULong,
 }
 
-/// The largest integer up to which doubles hold all.
-const MOST_EXACT: f64 = (1_u64 << 53) as f64;
+/// The largest integer of 53 bits. Doubles hold all up to it.
+pub(super) const MOST_EXACT: f64 = ((1_u64 << 53) - 1) as f64;
 
 impl Scalar {
     /// The name a header gives it.
@@ -74,8 +74,8 @@ impl Scalar {
             Scalar::UShort => Some((u16::MIN.into(), u16::MAX.into())),
             Scalar::Int => Some((i32::MIN.into(), i32::MAX.into())),
             Scalar::UInt => Some((u32::MIN.into(), u32::MAX.into())),
-            Scalar::Long => Some((-MOST_EXACT, MOST_EXACT)),
-            Scalar::ULong => Some((0.0, MOST_EXACT)),
+            Scalar::Long => Some((i64::MIN as f64, i64::MAX as f64)),
+            Scalar::ULong => Some((0.0, u64::MAX as f64)),
             Scalar::Float | Scalar::Double => None,
         }
     }

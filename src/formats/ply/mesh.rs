@@ -5,11 +5,14 @@ use std::fmt::Write;
 use glam::DVec3;
 
 use super::body::{Body, Row};
-use super::header::{Element, Header, Shape};
+use super::header::{Element, Header, MOST_EXACT, Shape};
 use super::parallel;
 use crate::formats::error::FormatError;
 use crate::geometry::Mesh;
 use crate::geometry::mesh::LabelBuilder;
+
+/// Most labels of a file per byte.
+const LABELS_PER_BYTE: usize = 2;
 
 /// Reads the `vertex` and `face` elements of a PLY file.
 ///
@@ -56,7 +59,9 @@ pub fn read_mesh(bytes: &[u8]) -> Result<Mesh, FormatError> {
             "repair or export the mesh again",
         ));
     }
-    mesh.push_unnamed(&strips);
+    let facets = mesh.facets.len().saturating_add(strips.len());
+    check_labels("tristrips", facets, mesh.labels.len(), bytes.len())?;
+    mesh.push_unnamed(strips);
     Ok(mesh)
 }
 
@@ -67,21 +72,39 @@ fn strip(
     number: usize,
     row: &Row,
 ) -> Result<(), FormatError> {
+    if let Some(&stray) =
+        (row.list.iter()).find(|&&corner| corner != -1.0 && vertex(corner, vertices).is_none())
+    {
+        return Err(no_such_vertex("tristrips", number, stray, vertices));
+    }
+    facets.reserve_exact(row.list.len());
     for strip in row.list.split(|corner| *corner == -1.0) {
-        let mut corners = Vec::with_capacity(strip.len());
-        for &corner in strip {
-            let index = vertex(corner, vertices)
-                .ok_or_else(|| no_such_vertex("tristrips", number, corner, vertices))?;
-            corners.push(index);
+        for (at, corners) in strip.windows(3).enumerate() {
+            let [a, b, c] = std::array::from_fn(|k| corners[k] as u32);
+            if a != b && b != c && c != a {
+                facets.push(if at % 2 == 1 { [b, a, c] } else { [a, b, c] });
+            }
         }
-        let triangles = corners.windows(3).enumerate().map(|(at, three)| match *three {
-            [a, b, c] if at % 2 == 1 => [b, a, c],
-            [a, b, c] => [a, b, c],
-            _ => [0; 3],
-        });
-        facets.extend(triangles.filter(|[a, b, c]| a != b && b != c && c != a));
     }
     Ok(())
+}
+
+/// A polygon with many corners, or a strip, repeats all labels as often, so a small file could ask for very many. A triangle
+/// has fewer labels than bytes, and the whole file may have [`LABELS_PER_BYTE`].
+fn check_labels(
+    place: impl std::fmt::Display,
+    facets: usize,
+    labels: usize,
+    file_bytes: usize,
+) -> Result<(), FormatError> {
+    if facets.saturating_mul(labels) <= file_bytes.saturating_mul(LABELS_PER_BYTE) {
+        return Ok(());
+    }
+    Err(FormatError::at(
+        place.to_string(),
+        format!("{labels} labels on polygons of so many corners"),
+        "export the mesh as triangles, or without the face properties",
+    ))
 }
 
 /// The number of a vertex, if there is such a one.
@@ -135,15 +158,11 @@ struct Faces {
     thin: Option<(usize, usize)>,
     /// Each with the place of its property.
     labels: Vec<(usize, LabelBuilder)>,
-    most_labels: usize,
+    file_bytes: usize,
     text: String,
 }
 
 impl Faces {
-    /// A face with many corners repeats all its labels as often, so a small file could ask for very
-    /// many. A triangle has fewer labels than bytes; this is how many the whole file may have per byte.
-    const LABELS_PER_BYTE: usize = 2;
-
     fn new(element: &Element, vertices: usize, file_bytes: usize) -> Faces {
         let labels = element.properties.iter().enumerate().filter_map(|(at, p)| match p.shape {
             Shape::Scalar(scalar) if scalar.integer_range().is_some() => {
@@ -156,7 +175,7 @@ impl Faces {
             facets: Vec::with_capacity(element.count),
             thin: None,
             labels: labels.collect(),
-            most_labels: file_bytes.saturating_mul(Faces::LABELS_PER_BYTE),
+            file_bytes,
             text: String::new(),
         }
     }
@@ -181,14 +200,16 @@ impl Faces {
     }
 
     fn label(&mut self, face: usize, scalars: &[f64], facets: usize) -> Result<(), FormatError> {
-        if self.facets.len().saturating_mul(self.labels.len()) > self.most_labels {
-            return Err(FormatError::at(
-                format!("face {face}"),
-                format!("{} labels on polygons of so many corners", self.labels.len()),
-                "export the mesh as triangles, or without the face properties",
-            ));
-        }
+        let place = format_args!("face {face}");
+        check_labels(place, self.facets.len(), self.labels.len(), self.file_bytes)?;
         for (at, label) in &mut self.labels {
+            if scalars[*at].abs() > MOST_EXACT {
+                return Err(FormatError::at(
+                    place.to_string(),
+                    format!("the label {} has more than 53 bits", scalars[*at]),
+                    "number the parts from 0",
+                ));
+            }
             self.text.clear();
             // Writing to a string cannot fail.
             let _ = write!(self.text, "{}", scalars[*at] as i64);
@@ -351,8 +372,9 @@ mod tests {
         };
         let mesh = read_mesh(&binary("little", properties, &body(-7))).unwrap();
         assert_eq!((mesh.facets[0], mesh.labels[0].names[0].as_str()), ([2, 1, 0], "-7"));
-        // A double does not hold it.
-        assert!(read_mesh(&binary("little", properties, &body(i64::MAX))).is_err());
+        // A double does not hold it, and parts would become one.
+        let refused = read_mesh(&binary("little", properties, &body(i64::MAX))).unwrap_err();
+        assert!(refused.to_string().starts_with("face 0: the label "), "{refused}");
     }
 
     #[test]

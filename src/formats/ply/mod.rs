@@ -6,7 +6,8 @@
 //!
 //! Where writers differ, the readers are lenient: `vertex_index` or `vertex_indices`, any type of
 //! number for any property, further properties and elements, CRLF line ends, comments that are not
-//! UTF-8, bytes after the last element. They insist on one line per entry in ascii files, on names
+//! UTF-8, bytes after the last element. In ascii files an entry may take several lines, and ends with
+//! one. They insist on names
 //! that are declared once, and on elements that have properties.
 
 mod body;

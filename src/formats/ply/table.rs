@@ -20,7 +20,7 @@ pub struct Column {
     pub name: String,
     /// How a file stores it.
     pub scalar: Scalar,
-    /// A value per point; an `f64` holds every [`Scalar`] exactly.
+    /// A value per point; an `f64` holds every [`Scalar`] of up to 53 bits exactly.
     pub values: Vec<f64>,
 }
 

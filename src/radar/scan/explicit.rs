@@ -16,7 +16,8 @@ const UNIT_LENGTH: f64 = 1e-6;
 const WRITTEN: [&str; 11] =
     ["time_s", "gamma_rad", "phi_rad", "xt_m", "yt_m", "ox_m", "oy_m", "oz_m", "dx", "dy", "dz"];
 
-/// Reads `chirp,ox_m,oy_m,oz_m,dx,dy,dz` and, where it is there, `time_s`; the mirror's angles stay empty.
+/// Reads `chirp,ox_m,oy_m,oz_m,dx,dy,dz` and, where it is there, `time_s`; the mirror's angles stay empty. Other columns of
+/// [`WRITTEN`] are passed over.
 pub(super) fn rays(file: &str, bytes: &[u8]) -> Result<Chirps, RadarError> {
     let columns = ["chirp", "ox_m", "oy_m", "oz_m", "dx", "dy", "dz"];
     let mut stretched = 0;
