@@ -555,6 +555,8 @@ fn a_material_has_a_limit_of_tags_and_a_permittivity_one_of_its_size() {
     let tags = (0..1001).map(|n| format!("\"t{n}\"")).collect::<Vec<_>>().join(", ");
     let message = add("tags = [", &format!("tags = [{tags}, "));
     check(&message, &["tags", "and 1000 are the most", "keep those by which"]);
+    let message = add("tags = [", "tags = [\"a\\u0000b\", ");
+    check(&message, &["tags: the text holds a NUL character", "remove it"]);
     let message = add("\nreal = ", "\nreal = 1e31 # ");
     check(&message, &["permittivity", "it is beyond 1e30", "relative to that of vacuum"]);
 }

@@ -23,7 +23,7 @@ const FORMATS: [&str; 6] =
 const MOST_S: u64 = 60;
 
 const SCENE: &str = "name = \"plate\"\nseed = 1\n[radar.scan]\npattern = \"raster\"\nlines = 4\n\
-    points_per_line = 4\n[[mesh]]\nname = \"plate\"\nfile = \"builtin:plate\"\nsize_m = [1, 1, 0]\n\
+    chirps_per_line = 4\n[[mesh]]\nname = \"plate\"\nfile = \"builtin:plate\"\nsize_m = [1, 1, 0]\n\
     translation_m = [0, 1.1, 0]\n[[region]]\nname = \"all\"\nmaterial = \"made-up\"\n";
 
 /// Runs a command that must succeed, or refuse in one sentence where `may_refuse`. Whether it succeeded.
@@ -130,6 +130,8 @@ fn what_is_accepted_goes_the_whole_way() {
         // A report of a fit that was not made here is refused by `publish`.
         if !has_reports {
             material.fits.iter_mut().for_each(|fit| fit.report = None);
+            material.frequency_hz = [250e9, 350e9];
+            material.status = Status::Active;
         }
         // Names of effects are checked where a file comes in: by `add --from` and `import`.
         material.effects.truncate(1);

@@ -11,7 +11,7 @@ use matdb::catalogue::{About, publish};
 use matdb::material::{Material, SourceKind, builtin};
 use matdb::store::Store;
 
-const HOSTILE: &str = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\"'&{{7*7}}{% x %}\u{0}\u{1b}[2J\u{202e}abc\u{2028}";
+const HOSTILE: &str = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\"'&{{7*7}}{% x %}\u{1}\u{1b}[2J\u{202e}abc\u{2028}";
 
 /// A built-in catalogue, a fitted material and one that means harm.
 fn materials() -> Vec<Material> {

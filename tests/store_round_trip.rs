@@ -24,7 +24,8 @@ use std::cell::RefCell;
 use std::f64::consts::FRAC_PI_2;
 
 fn text() -> impl Strategy<Value = String> {
-    prop_oneof![any::<String>(), Just("\0'\";--\n\u{10ffff}".to_owned())]
+    let any = any::<String>().prop_map(|text| text.replace('\0', ""));
+    prop_oneof![any, Just("'\";--\n\u{10ffff}".to_owned())]
 }
 
 fn word() -> impl Strategy<Value = String> {

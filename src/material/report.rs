@@ -4,7 +4,6 @@ use serde::{Deserialize, Serialize};
 
 use super::error::{MaterialError, value};
 use super::form::is_hash;
-use super::number_check::is_number;
 
 /// The record of one fit to one curve.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -185,7 +184,7 @@ impl FitReport {
 
     /// What of it has no meaning.
     fn problem(&self) -> Option<&'static str> {
-        if self.numbers().any(|number| !is_number(number)) {
+        if self.numbers().any(|number| !number.is_finite()) {
             return Some("a number is not finite");
         }
         let not_negative = [self.noise_w, self.looks.unwrap_or(0.0)];

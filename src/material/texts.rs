@@ -9,14 +9,20 @@ use super::revision::Material;
 pub const LONGEST_TEXT_BYTES: usize = 64 << 10;
 
 impl Material {
-    /// Refuses a text that is longer than [`LONGEST_TEXT_BYTES`].
-    pub(super) fn check_lengths(&self) -> Result<(), MaterialError> {
-        let mut found = None;
+    /// Refuses a text that is longer than [`LONGEST_TEXT_BYTES`], and one with a NUL, at which SQLite's functions end a text.
+    pub(super) fn check_texts(&self) -> Result<(), MaterialError> {
+        let (mut found, mut ended) = (None, None);
         self.texts(&mut |place, text| {
             if text.len() > LONGEST_TEXT_BYTES && found.is_none() {
                 found = Some((place.to_owned(), text.len()));
             }
+            if text.contains('\0') && ended.is_none() {
+                ended = Some(place.to_owned());
+            }
         });
+        if let Some(place) = ended {
+            return Err(value(&place, "the text holds a NUL character", "remove it"));
+        }
         let Some((place, bytes)) = found else { return Ok(()) };
         let problem = format!(
             "the text has {} KiB and {} KiB are the most",
