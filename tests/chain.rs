@@ -1,5 +1,6 @@
-//! Promise: whatever `add` accepts can be shown, checked, drawn, exported with finite numbers, rendered, published, verified,
-//! imported with the same hash, withdrawn and removed, each within a minute.
+//! Promise: whatever `add` accepts can be shown, withdrawn and removed. It is drawn, exported with finite numbers and rendered, or
+//! refused in one sentence. Where `check` finds it sound it is published, verified and imported with the same hash. Each
+//! takes less than a minute.
 //!
 //! The materials are those that proptest makes up for `store_round_trip.rs`. `MATDB_TEST_MANY_CHAINS=1` draws three hundred.
 

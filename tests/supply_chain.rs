@@ -1,4 +1,4 @@
-//! Promise: every crate that the program may have is under a licence that `deny.toml` allows, from the registry that it names,
+//! Promise: every crate of which this program is built is under a licence that `deny.toml` allows, from the registry that it names,
 //! and none that it bans.
 
 use std::process::Command;

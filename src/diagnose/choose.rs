@@ -2,9 +2,9 @@
 //!
 //! All effects are screened on a sample of the shots. Those that promise enough are fitted together with
 //! the scattering models, first to the sample, the best few to all shots. These predict held-out patches from fits
-//! without them. One is accepted under four conditions. Its held-out gain exceeds
-//! one and a half standard errors over patches (or, for means that shift in one small place, is far beyond chance and
-//! found again where it was not fitted). Held-out errors do not grow, unless that gain leaves no doubt. Its gain in the
+//! without them. One is accepted under four conditions. Its held-out gain exceeds one and a half
+//! standard errors over patches (or, for means that shift in one small place, is far beyond chance and found again where it
+//! was not fitted). Held-out errors do not grow, unless that gain leaves no doubt. Its gain in the
 //! fit beats that of placebos and a stated least. It changes the data by a stated least size. Where placebos beat all, two effects that
 //! predict held-out patches are tried together: either alone describes both worse than a wave does.
 
