@@ -43,7 +43,11 @@ impl Problem<'_> {
             let wide = self.slopes_over(WIDE_TO_NARROW[0], space, at, [&lower, &upper], &terms);
             let both = of_free(products(&terms, [&slopes, &wide]));
             told = told::deviations(&of_shots, &both);
-            self.widen(space, at, &free, &of_shots, &mut told);
+            let alone = of_shots.diagonal().map(|bend| bend.max(f64::MIN_POSITIVE).sqrt().recip());
+            let smooth = self.smooth_curvature(space, &terms, &slopes);
+            let smooth = smooth.select_rows(&free).select_columns(&free);
+            let ways = Ways { together: moving_together(&smooth, &alone), free: &free, alone };
+            self.widen(space, at, &ways, &mut told);
         }
         let inverse = of_shots.try_inverse().map(|inverse| &inverse * of_cells * &inverse);
         let mut sd = vec![f64::INFINITY; at.len()];
@@ -58,23 +62,14 @@ impl Problem<'_> {
     }
 
     /// Widens the standard deviations of unknowns that move the target until ln p falls as they promise, with all others where
-    /// they are likeliest. What moves along where ln p does not fall is told no better. `free`: the unknowns of `products`
-    /// and `told`.
-    fn widen(
-        &self,
-        space: &Space,
-        at: &DVector<f64>,
-        free: &[usize],
-        products: &DMatrix<f64>,
-        told: &mut [Option<f64>],
-    ) {
+    /// they are likeliest. What moves along where ln p does not fall is told no better. `told` is of the free unknowns.
+    fn widen(&self, space: &Space, at: &DVector<f64>, ways: &Ways, told: &mut [Option<f64>]) {
+        let Ways { free, alone, together } = ways;
         let [lower, upper] = space.bounds();
         let (moving, here) = (space.moving_of(MOST_MOVING), self.ln_likelihood(space, at));
         if moving.is_empty() {
             return;
         }
-        let alone = products.diagonal().map(|bend| bend.max(f64::MIN_POSITIVE).sqrt().recip());
-        let together = self.moving_together(space, at, free, &alone);
         let mut least = vec![0.0; free.len()];
         for place in (0..free.len()).filter(|&place| moving.contains(&free[place])) {
             // A direction that nothing tells may need another unknown, which seems told by itself.
@@ -89,7 +84,7 @@ impl Problem<'_> {
                 let fall = here - there.ln_likelihood;
                 if fall < LEAST_FALL {
                     let deviations = (2.0 * fall.max(CHANCE)).sqrt();
-                    for (least, &i) in least.iter_mut().zip(free) {
+                    for (least, &i) in least.iter_mut().zip(*free) {
                         *least = f64::max(*least, (there.at[i] - at[i]).abs() / deviations);
                     }
                 }
@@ -101,28 +96,29 @@ impl Problem<'_> {
             *told = told.map(|sd| sd.max(least));
         }
     }
+}
 
-    /// How all unknowns move with each of them, in its column, where they keep to the surface: by the curvature of the shots
-    /// that no edge passes over. `alone`: deviations with all others known.
-    fn moving_together(
-        &self,
-        space: &Space,
-        at: &DVector<f64>,
-        free: &[usize],
-        alone: &DVector<f64>,
-    ) -> DMatrix<f64> {
-        let len = free.len();
-        let smooth = self.smooth_curvature(space, at).select_rows(free).select_columns(free);
-        let scaled = DMatrix::from_fn(len, len, |row, column| {
-            let hold = if row == column { HOLD } else { 0.0 };
-            alone[row] * smooth[(row, column)] * alone[column] + hold
-        });
-        let Some(inverse) = scaled.try_inverse() else { return DMatrix::identity(len, len) };
-        DMatrix::from_fn(len, len, |row, column| {
-            let part = inverse[(row, column)] / inverse[(column, column)];
-            part * alone[row] / alone[column]
-        })
-    }
+/// How free unknowns move.
+struct Ways<'a> {
+    free: &'a [usize],
+    /// Deviations with all others known.
+    alone: DVector<f64>,
+    /// In each column how all move with that of the column, where they keep to the surface.
+    together: DMatrix<f64>,
+}
+
+/// [`Ways::together`] by the curvature of the shots that no edge passes over. `alone`: deviations with all others known.
+fn moving_together(smooth: &DMatrix<f64>, alone: &DVector<f64>) -> DMatrix<f64> {
+    let len = alone.len();
+    let scaled = DMatrix::from_fn(len, len, |row, column| {
+        let hold = if row == column { HOLD } else { 0.0 };
+        alone[row] * smooth[(row, column)] * alone[column] + hold
+    });
+    let Some(inverse) = scaled.try_inverse() else { return DMatrix::identity(len, len) };
+    DMatrix::from_fn(len, len, |row, column| {
+        let part = inverse[(row, column)] / inverse[(column, column)];
+        part * alone[row] / alone[column]
+    })
 }
 
 /// Sum of the products of the shots' scores, by slopes of one or of two widths. Powers that share speckle count for less,

@@ -167,7 +167,9 @@ impl Problem<'_> {
     /// an edge one chirp after the other, and its slopes hardly show it.
     pub fn along_axes(&self, space: &Space, at: &DVector<f64>) -> Option<DVector<f64>> {
         let [lower, upper] = space.bounds();
-        let axes = self.smooth_curvature(space, at).symmetric_eigen();
+        let terms = self.terms(space, at);
+        let slopes = self.slopes(space, at, [&lower, &upper], &terms);
+        let axes = self.smooth_curvature(space, &terms, &slopes).symmetric_eigen();
         let mut best = (self.ln_likelihood(space, at), None);
         for (axis, bend) in axes.eigenvectors.column_iter().zip(&axes.eigenvalues) {
             let reach = bend.max(f64::MIN_POSITIVE).sqrt().recip().min(1.0);
@@ -183,12 +185,14 @@ impl Problem<'_> {
     }
 
     /// Curvature of −ln likelihood without the shots that an edge passes over.
-    pub fn smooth_curvature(&self, space: &Space, at: &DVector<f64>) -> DMatrix<f64> {
-        let [lower, upper] = space.bounds();
-        let terms = self.terms(space, at);
-        let slopes = self.slopes(space, at, [&lower, &upper], &terms);
+    pub fn smooth_curvature(
+        &self,
+        space: &Space,
+        terms: &[Term],
+        slopes: &[Vec<Slope>],
+    ) -> DMatrix<f64> {
         let smooth_m = SMOOTH_M.max(3.0 * self.declared.range_sd_m);
-        let smooth = local(&terms, &slopes, |shot| {
+        let smooth = local(terms, slopes, |shot| {
             let mut of_effects = slopes.iter().skip(space.base_len());
             of_effects.all(|slopes| {
                 let Slope { ln_mean, range_m, .. } = slopes[shot];

@@ -10,6 +10,7 @@ use csv::StringRecord;
 
 use super::columns::{ColumnNames, passed_over, twice};
 use super::error::FormatError;
+use super::line::unmarked;
 
 /// A table of text cells under named columns.
 #[derive(Clone, Debug, PartialEq)]
@@ -79,10 +80,7 @@ impl Table {
     /// # Errors
     /// The line that is not like the header.
     pub fn parse(bytes: &[u8], names: Names) -> Result<Table, FormatError> {
-        if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
-            return Err(FormatError::at("the file", "the text is UTF-16", "save it as UTF-8"));
-        }
-        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+        let bytes = unmarked(bytes)?;
         let head = head(bytes);
         let bytes = without_head(bytes);
         let separator = Separator::of(&bytes);

@@ -11,10 +11,18 @@ use super::error::FormatError;
 /// # Errors
 /// Text in UTF-16.
 pub(super) fn text(bytes: &[u8]) -> Result<Cow<'_, str>, FormatError> {
+    Ok(String::from_utf8_lossy(unmarked(bytes)?))
+}
+
+/// The bytes of a text without their mark.
+///
+/// # Errors
+/// Text in UTF-16.
+pub(super) fn unmarked(bytes: &[u8]) -> Result<&[u8], FormatError> {
     if let [0xFF, 0xFE, ..] | [0xFE, 0xFF, ..] = bytes {
-        return Err(FormatError::at("byte 0", "this is text in UTF-16", "save it as UTF-8"));
+        return Err(FormatError::at("the file", "the text is UTF-16", "save it as UTF-8"));
     }
-    Ok(String::from_utf8_lossy(without_mark(bytes)))
+    Ok(without_mark(bytes))
 }
 
 /// A file without a byte order mark of UTF-8.
@@ -63,6 +71,6 @@ mod tests {
     fn a_byte_order_mark_is_no_text() {
         assert_eq!(text(b"\xEF\xBB\xBFv 0 0 0").unwrap(), "v 0 0 0");
         let refused = text(b"\xFF\xFEv\0").unwrap_err().to_string();
-        assert_eq!(refused, "byte 0: this is text in UTF-16; save it as UTF-8");
+        assert_eq!(refused, "the file: the text is UTF-16; save it as UTF-8");
     }
 }

@@ -17,7 +17,7 @@ const MOST_TAGS: usize = 1000;
 impl Material {
     /// Checks names, references, ranges and values.
     pub fn validate(&self) -> Result<(), MaterialError> {
-        self.check_texts()?;
+        self.check_every_text()?;
         if self.tags.len() > MOST_TAGS {
             let problem = format!("{} are given and {MOST_TAGS} are the most", self.tags.len());
             return Err(value("tags", &problem, "keep those by which the material is looked for"));

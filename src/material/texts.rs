@@ -10,7 +10,7 @@ pub const LONGEST_TEXT_BYTES: usize = 64 << 10;
 
 impl Material {
     /// Refuses a text that is longer than [`LONGEST_TEXT_BYTES`], and one with a NUL, at which SQLite's functions end a text.
-    pub(super) fn check_texts(&self) -> Result<(), MaterialError> {
+    pub(super) fn check_every_text(&self) -> Result<(), MaterialError> {
         let (mut found, mut ended) = (None, None);
         self.texts(&mut |place, text| {
             if text.len() > LONGEST_TEXT_BYTES && found.is_none() {
