@@ -1,7 +1,7 @@
 //! All promises of the program, a module each: one program compiles and links far faster than sixty, and what they share is
 //! compiled once. `cargo test --test promises sheets::` runs the promise of `sheets.rs`.
 //!
-//! Apart from it stands `store_all_or_nothing.rs`, which puts hooks on every connection of its process to the database.
+//! Apart from it stands `store_all_or_nothing/`, which puts hooks on every connection of its process to the database.
 
 mod any_pose;
 mod bad_input;
@@ -14,6 +14,7 @@ mod check_command;
 mod closed_forms;
 mod closest_hits;
 mod closing_the_loop;
+mod damaged_pages;
 mod database;
 mod diagnose_add;
 mod diagnose_command;
@@ -26,6 +27,7 @@ mod fit_command;
 mod fitting_page;
 mod floors;
 mod foreign_files;
+mod fuzz_targets;
 #[cfg(feature = "gpu")]
 mod gpu_batch;
 #[cfg(feature = "gpu")]
@@ -35,6 +37,7 @@ mod hostile_text;
 mod illumination;
 mod import_command;
 mod instrument;
+mod killed;
 mod levels_page;
 mod mannequin_asset;
 mod material_values;
@@ -44,6 +47,7 @@ mod one_beam;
 mod orthogonal_distance;
 mod other_code;
 mod outside_the_range;
+mod peer_files;
 mod performance_page;
 mod polarisation;
 mod power_from_scan_json;

@@ -5,7 +5,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::support::database::{contents, is_sound, sound};
+use crate::support::database::{change, contents, is_sound, sound};
 use crate::support::{self, matdb, refused};
 use matdb::brdf::{Brdf, Lambert, MOST_LEVELS, MOST_MODELS, Mixture, Sum};
 use matdb::material::{Activity, Input, Material, builtin};
@@ -265,10 +265,10 @@ fn a_material_whose_row_is_lost_comes_back_with_all_that_was_measured() {
     matdb(folder.path()).args(["check", "--repair"]).assert().success();
     assert_eq!(contents(&path), whole);
 
-    // Without any word of its name it cannot come back, and its measured rows stay all the same.
+    // Without any word of its name it cannot come back, and its measured rows stay in a copy.
     tamper(&path, "DELETE FROM material; DELETE FROM entry");
-    matdb(folder.path()).args(["check", "--repair"]).assert().failure();
-    let left: i64 = Connection::open(&path)
+    matdb(folder.path()).args(["check", "--repair"]).assert().success();
+    let left: i64 = Connection::open(folder.path().join("matdb.sqlite.before-repair"))
         .unwrap()
         .query_row("SELECT count(*) FROM observation", [], |row| row.get(0))
         .unwrap();
@@ -318,7 +318,7 @@ fn one_bad_name_does_not_keep_the_rest_from_being_mended() {
     tamper(
         &path,
         "PRAGMA ignore_check_constraints = on; UPDATE material SET slug = 'No Name' WHERE slug = 'glass';
-         DROP TABLE unit; UPDATE fit_parameter SET value = value / 2 WHERE path = 'k' AND revision_id IN
+         DELETE FROM entry WHERE slug = 'glass'; DROP TABLE unit; UPDATE fit_parameter SET value = value / 2 WHERE path = 'k' AND revision_id IN
          (SELECT revision.id FROM revision JOIN material ON material.id = material_id WHERE slug = 'ptfe')",
     );
     let output = matdb(folder.path()).args(["check", "--repair", "--json"]).output().unwrap();
@@ -369,6 +369,81 @@ fn what_is_not_at_hand_is_left_and_named_and_what_is_sound_is_mended_around_it()
     assert_eq!(Store::open_existing(&path).unwrap().unwrap().history(&own.slug).unwrap(), before);
     assert_eq!(contents(&path), [own, ptfe]);
     matdb(folder.path()).arg("check").assert().success();
+}
+
+#[test]
+fn an_earlier_revision_never_passes_for_the_current_one() {
+    let (folder, path) = database(&["ptfe"]);
+    let withdraw = ["withdraw", "ptfe", "--reason", "the trihedral was dented"];
+    matdb(folder.path()).args(withdraw).assert().success();
+    tamper(&path, "UPDATE material SET current_revision = 1");
+    for command in ["show ptfe", "cite ptfe", "publish site"] {
+        let message = refused(matdb(folder.path()).arg("-q").args(command.split(' ')));
+        assert!(message.contains("revision 1 as its current one, and a revision 2"), "{message}");
+    }
+    matdb(folder.path()).arg("check").assert().failure();
+    matdb(folder.path()).args(["check", "--repair"]).assert().success();
+    let listed = matdb(folder.path()).arg("list").assert().success();
+    assert!(String::from_utf8_lossy(&listed.get_output().stdout).contains("withdrawn"));
+}
+
+#[test]
+fn a_built_in_never_stands_in_for_a_material_that_has_lost_its_row() {
+    let (folder, path) = database(&["cotton"]);
+    let scene = scene_of(folder.path(), "cotton");
+    tamper(&path, "DELETE FROM material");
+    for command in ["show cotton", "cite cotton", "export cotton --as csv -o c.csv"] {
+        let message = refused(matdb(folder.path()).arg("-q").args(command.split(' ')));
+        assert!(message.contains("its own row is not there"), "{message}");
+    }
+    refused(matdb(folder.path()).arg("-q").arg("render").arg(&scene).args(["-o", "out"]));
+    matdb(folder.path()).arg("check").assert().failure();
+    fs::copy(&path, folder.path().join("copy.sqlite")).unwrap();
+    matdb(folder.path()).args(["check", "--repair"]).assert().success();
+    matdb(folder.path()).args(["show", "cotton"]).assert().success();
+    // Or it is removed.
+    let mut other = matdb(folder.path());
+    other.args(["--db", "copy.sqlite", "rm", "cotton"]).assert().success();
+    matdb(folder.path()).args(["--db", "copy.sqlite", "check"]).assert().success();
+}
+
+#[test]
+fn what_a_lost_revision_leaves_behind_is_removed_and_a_copy_keeps_it() {
+    for lost in [
+        "DELETE FROM revision WHERE number = 1",
+        // With all its revisions: the rows and the line of a list that named them.
+        "DELETE FROM material; DELETE FROM entry; DELETE FROM revision WHERE number = 2",
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("matdb.sqlite");
+        let mut store = Store::open(&path).unwrap();
+        store.add([&sound("own")]).unwrap();
+        store.add([&change(sound("own"))]).unwrap();
+        drop(store);
+        let levels = |path: &Path| -> i64 {
+            let conn = Connection::open(path).unwrap();
+            conn.query_row("SELECT count(*) FROM observation", [], |row| row.get(0)).unwrap()
+        };
+        let before = levels(&path);
+        tamper(&path, lost);
+        refused(matdb(folder.path()).args(["-q", "publish", "site"]));
+        let output = matdb(folder.path()).args(["check", "--repair"]).assert().success();
+        let said = String::from_utf8_lossy(&output.get_output().stdout).into_owned();
+        let copy = folder.path().join("matdb.sqlite.before-repair");
+        assert!(
+            said.contains("rows of lost revisions") && said.contains(".before-repair has them"),
+            "{said}"
+        );
+        assert_eq!(levels(&copy), before);
+        assert!(levels(&path) < before);
+        matdb(folder.path()).arg("check").assert().success();
+        // The number that was lost is not taken by what is added next.
+        assert_eq!(Store::open(&path).unwrap().add([&sound("new")]).unwrap(), [Addition::New]);
+        matdb(folder.path()).arg("check").assert().success();
+        // Nothing more to copy.
+        matdb(folder.path()).args(["check", "--repair"]).assert().success();
+        assert!(!folder.path().join("matdb.sqlite.before-repair-2").exists());
+    }
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! The check of a whole database, after a repair where one is wanted.
 
 use std::collections::HashMap;
+use std::path::PathBuf;
 
 use serde::Serialize;
 
@@ -10,6 +11,9 @@ use crate::error::Error;
 use crate::material::{Lobes, builtin};
 use crate::setup::Database;
 use crate::store::{Filter, OutlineEntry, Repair, Store, StoreError};
+
+/// Most copies of a database that repairs leave beside it.
+const MOST_COPIES: u32 = 99;
 
 /// How a database is checked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -78,7 +82,9 @@ impl DatabaseCheck {
     ) -> Result<CheckReport, Error> {
         let mut repair = Repair::default();
         if self.repair && database.read()?.is_some() {
-            repair = database.write()?.repair(&builtin::all()?)?;
+            let mut store = database.write()?;
+            repair = store.repair(&builtin::all()?)?;
+            remove_unreachable(&mut store, &mut repair)?;
         }
         let Some(store) = database.read()? else {
             return Err(Error::NoDatabase { path: database.path().to_owned() });
@@ -97,18 +103,64 @@ impl DatabaseCheck {
             advance: &mut || progress(CheckProgress::Revision),
         }
         .run(&store);
-        let outlines = store.outlines(&Filter::default()).unwrap_or_default();
+        // What is damaged is a finding already; a disk that fails only now is not.
+        let mut unread = |error: StoreError| {
+            if findings.is_empty() {
+                findings.push(Problem { place: file.clone(), problem: error.to_string() });
+            }
+        };
+        let outlines = store.outlines(&Filter::default()).unwrap_or_else(|error| {
+            unread(error);
+            Vec::new()
+        });
+        let notices = too_much(&store, &outlines, &mut unread);
         let is_of_surface = |line: &&OutlineEntry| line.lobes == Lobes::Surface;
         Ok(CheckReport {
             revisions,
             curves,
             fits,
             surface_lobes: outlines.iter().filter(is_of_surface).count(),
-            notices: too_much(&store, &outlines),
+            notices,
             repaired: repair.mended,
             findings,
         })
     }
+}
+
+/// Removes rows that belong to no material, after a copy of the database was written beside it.
+fn remove_unreachable(store: &mut Store, repair: &mut Repair) -> Result<(), Error> {
+    if store.unreachable_rows()? == 0 {
+        return Ok(());
+    }
+    let name = |number: u32| {
+        let mut name = store.path().as_os_str().to_owned();
+        name.push(if number == 1 {
+            ".before-repair".to_owned()
+        } else {
+            format!(".before-repair-{number}")
+        });
+        PathBuf::from(name)
+    };
+    let is_free = |path: &PathBuf| path.symlink_metadata().is_err();
+    let Some(copy) = (1..=MOST_COPIES).map(name).find(is_free) else {
+        repair.failed.push(format!(
+            "rows of no material stay: {MOST_COPIES} copies of earlier repairs lie beside it"
+        ));
+        return Ok(());
+    };
+    match store.copy_to(&copy) {
+        Ok(()) => {
+            let rows = store.remove_unreachable_rows()?;
+            repair.mended.push(format!(
+                "{rows} rows of lost revisions belonged to no material and were removed; {} has them",
+                copy.display()
+            ));
+        }
+        Err(error) => repair
+            .failed
+            .push(format!("rows of no material stay, since no copy can be written: {error}")),
+    }
+    Ok(())
 }
 
 /// What tells rendered laws apart: the hash of the model, and the bits of its range of angles.
@@ -123,13 +175,22 @@ struct TooMuch {
 }
 
 /// Materials of which scenes render a law that reflects more than it receives, or more than a mirror through the
-/// default radar's beam, a sentence each. What cannot be read is a finding already.
-fn too_much(store: &Store, outlines: &[OutlineEntry]) -> Vec<String> {
+/// default radar's beam, a sentence each. `unread` gets the errors.
+fn too_much(
+    store: &Store,
+    outlines: &[OutlineEntry],
+    unread: &mut dyn FnMut(StoreError),
+) -> Vec<String> {
     let mut known: HashMap<RenderedLaw, TooMuch> = HashMap::new();
     let mut notices = Vec::new();
     for OutlineEntry { slug, model_hash, theta_rad, .. } in outlines {
         let of_law = known.entry((*model_hash, theta_rad.map(f64::to_bits))).or_insert_with(|| {
-            let rendered = slug.parse().ok().and_then(|wanted| store.rendered(&wanted).ok()?);
+            let rendered = slug.parse().ok().and_then(|wanted| {
+                store.rendered(&wanted).unwrap_or_else(|error| {
+                    unread(error);
+                    None
+                })
+            });
             rendered.map_or_else(TooMuch::default, |(law, theta_rad)| TooMuch {
                 excess: Excess::of(&law, theta_rad),
                 beyond: BeyondBeam::of(&law, VIEWING_RAD),

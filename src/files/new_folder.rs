@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use tempfile::{Builder, TempDir};
 
 use super::error::FilesError;
-use super::path::folder_of;
+use super::path::{exchange, folder_of};
 
 /// Ends the name of what stood at the target while something else takes its place.
 const BEFORE: &str = "before";
@@ -161,18 +161,6 @@ fn carry(kept: &[&str], from: &Path, to: &Path) -> io::Result<()> {
         }
     }
     Ok(())
-}
-
-/// Exchanges two folders in one step, so that at every moment there is one of each name.
-#[cfg(target_os = "linux")]
-fn exchange(a: &Path, b: &Path) -> io::Result<()> {
-    use rustix::fs::{CWD, RenameFlags, renameat_with};
-    Ok(renameat_with(CWD, a, CWD, b, RenameFlags::EXCHANGE)?)
-}
-
-#[cfg(not(target_os = "linux"))]
-fn exchange(_: &Path, _: &Path) -> io::Result<()> {
-    Err(io::ErrorKind::Unsupported.into())
 }
 
 /// Waits until the disk has all of a folder.

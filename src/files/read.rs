@@ -43,9 +43,13 @@ fn open(path: &Path) -> io::Result<File> {
 /// # Errors
 /// A file that cannot be read, or is larger (`ErrorKind::FileTooLarge`); a pipe that no program writes to.
 pub fn read_whole(path: &Path) -> Result<Vec<u8>, FilesError> {
+    read_up_to(path, MOST_OF_A_PIPE_BYTES)
+}
+
+fn read_up_to(path: &Path, most_of_a_pipe: u64) -> Result<Vec<u8>, FilesError> {
     let whole = open(path).and_then(|file| {
         let found = file.metadata()?;
-        let most = if found.is_file() { LARGEST_FILE_BYTES } else { MOST_OF_A_PIPE_BYTES };
+        let most = if found.is_file() { LARGEST_FILE_BYTES } else { most_of_a_pipe };
         if found.is_file() {
             check_size(found.len(), most)?;
         }
@@ -103,6 +107,10 @@ mod tests {
         File::options().write(true).open(&path).unwrap().set_len(LARGEST_FILE_BYTES + 1).unwrap();
         let refused = read_whole(&path).unwrap_err();
         assert!(refused.to_string().contains("it is larger than 16 GiB"), "{refused}");
+        if cfg!(unix) {
+            let endless = read_up_to(Path::new("/dev/zero"), 3 << 20).unwrap_err();
+            assert!(endless.to_string().contains("it is larger than 3 MiB"), "{endless}");
+        }
         let missing = read_small(&folder.path().join("missing")).unwrap_err();
         assert!(missing.to_string().ends_with("; check the path"), "{missing}");
     }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use tempfile::{Builder, NamedTempFile, TempPath};
 
 use super::error::FilesError;
-use super::path::folder_of;
+use super::path::{exchange, folder_of};
 
 /// Begins the names of files that are being written.
 const PREFIX: &str = ".matdb-";
@@ -170,6 +170,10 @@ impl NewFile<'_> {
         };
         let before = match path.symlink_metadata() {
             Ok(found) if found.is_dir() => return Err(ErrorKind::IsADirectory.into()),
+            // In one step where the system can: a program that dies meanwhile leaves one of the two files there.
+            Ok(_) if exchange(file.path(), &path).is_ok() => {
+                return Ok(Some(Replacement { path, before: Some(file.into_temp_path()) }));
+            }
             Ok(_) => {
                 let before =
                     Builder::new().prefix(PREFIX).tempfile_in(folder_of(&path))?.into_temp_path();

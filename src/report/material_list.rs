@@ -72,10 +72,13 @@ impl MaterialList {
         if list.rows.is_empty() {
             list.unknown_words = unknown_words(filter, store, &not_added)?;
         }
-        let most_counted = MOST_COUNTED.saturating_add(most);
-        let all = store.count(filter, most_counted)?;
-        list.more = all.saturating_sub(list.rows.len());
-        list.more_at_least = all as u64 == u64::from(most_counted);
+        // A page that is not full is the last.
+        if list.rows.len() as u64 == u64::from(most) {
+            let most_counted = MOST_COUNTED.saturating_add(most);
+            let all = store.count(filter, most_counted)?;
+            list.more = all.saturating_sub(list.rows.len());
+            list.more_at_least = all as u64 == u64::from(most_counted);
+        }
         Ok(list)
     }
 }

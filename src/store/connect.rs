@@ -11,6 +11,7 @@ use rusqlite::functions::FunctionFlags;
 use rusqlite::{Connection, ErrorCode, OpenFlags, Transaction, TransactionBehavior};
 use rusqlite_migration::{M, Migrations};
 
+use super::damage::check_pages;
 use super::error::{InFile, StoreError};
 use super::find::outline;
 use super::rows::rows;
@@ -144,6 +145,9 @@ fn open_writable(path: &Path) -> Result<Connection, StoreError> {
     if conn.is_readonly("main").in_file(path)? {
         return Err(StoreError::read_only(path));
     }
+    // A new file begins with a rollback journal. Were its removal lost when the power fails, a later reader would undo
+    // with it what the log has brought since (sqlite.org/pragma.html, "EXTRA").
+    conn.pragma_update(None, "synchronous", "extra").in_file(path)?;
     conn.pragma_update(None, "journal_mode", "wal").in_file(path)?;
     // Two writers that both begin with reading would block each other.
     conn.set_transaction_behavior(TransactionBehavior::Immediate);
@@ -248,6 +252,10 @@ fn open_unchanged(path: &Path) -> Result<Connection, StoreError> {
         result => {
             result.in_file(path)?;
             check_length(path, &conn)?;
+            if log_exists {
+                // It may be the log of another database, and its pages replace those of this one.
+                check_pages(&conn).in_file(path)?;
+            }
             Ok(conn)
         }
     }

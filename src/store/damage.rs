@@ -4,10 +4,11 @@ use rusqlite::{Connection, Result};
 
 use super::error::{is_damage, reason};
 use super::find::stale;
+use super::read::damaged;
 use super::rows::rows;
 
-/// Every problem of a file as a sentence: damaged pages, references to missing rows, and rows of lists and searches
-/// that differ from their material.
+/// Every problem of a file as a sentence: damaged pages, references to missing rows, current revisions that are not the
+/// latest, and rows of lists and searches that differ from their material.
 pub(super) fn damage(conn: &Connection) -> Result<Vec<String>> {
     let found = match rows(conn, "PRAGMA integrity_check", [], |row| row.get::<_, String>(0)) {
         // It evaluates the CHECK of every row, and a text that is not JSON ends it.
@@ -26,13 +27,50 @@ pub(super) fn damage(conn: &Connection) -> Result<Vec<String>> {
         }
         dangling => dangling?,
     };
-    let problems: Vec<String> =
-        found.into_iter().filter(|line| line != "ok").chain(dangling).collect();
+    // One row may be several problems, below a line with the name of the database.
+    let lines = found.iter().flat_map(|row| row.lines());
+    let lines = lines.filter(|line| *line != "ok" && !line.starts_with("*** in database"));
+    let problems: Vec<String> = lines.map(str::to_owned).chain(dangling).collect();
     if !problems.is_empty() {
         return Ok(problems);
     }
+    let sql = "SELECT slug, current_revision, max(number)
+               FROM material JOIN revision ON material_id = material.id GROUP BY material.id
+               HAVING current_revision <> max(number) ORDER BY slug";
+    let mut problems = rows(conn, sql, [], |row| {
+        let (slug, current, latest): (String, u32, u32) = (row.get(0)?, row.get(1)?, row.get(2)?);
+        Ok(format!("`{slug}` has revision {current} as its current one, and a revision {latest}"))
+    })?;
     let stale = stale(conn)?.into_iter();
-    Ok(stale
-        .map(|slug| format!("what lists and searches say of `{slug}` is not what is stored"))
-        .collect())
+    problems.extend(
+        stale.map(|slug| format!("what lists and searches say of `{slug}` is not what is stored")),
+    );
+    Ok(problems)
+}
+
+/// Largest database whose pages are all looked at before one is written, bytes. This takes as long for each as to read
+/// every row.
+const MOST_LOOKED_AT_BYTES: i64 = 8 << 20;
+
+/// Fails where pages of a database contradict each other, such as cells that overlap: whoever writes one of them would
+/// damage what is stored beside. Databases above 8 MiB are not looked at.
+pub(super) fn check_pages(conn: &Connection) -> Result<()> {
+    let sql = "SELECT page_count * page_size FROM pragma_page_count, pragma_page_size";
+    let bytes: i64 = conn.query_row(sql, [], |row| row.get(0))?;
+    if bytes > MOST_LOOKED_AT_BYTES {
+        return Ok(());
+    }
+    let found = rows(conn, "PRAGMA quick_check", [], |row| row.get::<_, String>(0))?;
+    // Values that contradict their column leave the pages sound, and the material can still be replaced or removed.
+    let of_pages = found.iter().flat_map(|row| row.lines()).find(|line| {
+        ["Tree ", "Page ", "Freelist", "Fragmentation", "Outstanding", "Main freelist"]
+            .iter()
+            .any(|begin| line.starts_with(begin))
+            || line.contains(" never used")
+            || line.contains("reference to page")
+    });
+    match of_pages {
+        None => Ok(()),
+        Some(line) => Err(damaged(line.to_owned())),
+    }
 }

@@ -1,5 +1,6 @@
 //! Adding and removing materials.
 
+use super::damage::check_pages;
 use super::database::Store;
 use super::error::{InFile, StoreError};
 use super::record::{Addition, Removal};
@@ -58,6 +59,7 @@ impl Store {
         }
         let Store { conn, path, .. } = self;
         let tx = conn.transaction().in_file(path)?;
+        check_pages(&tx).in_file(path)?;
         let mut adding = write::MaterialWriter::new(&tx);
         let added: Result<Vec<Addition>, _> =
             made.iter().map(|(material, activity)| adding.add(material, *activity)).collect();
@@ -93,6 +95,7 @@ impl Store {
     ) -> Result<(), E> {
         let Store { conn, path, .. } = self;
         let tx = conn.transaction().in_file(path)?;
+        check_pages(&tx).in_file(path)?;
         let mut adding = write::MaterialWriter::new(&tx);
         for made in made {
             let (material, activity) = made?;

@@ -120,17 +120,31 @@ fn one(conn: &Connection, slug: &Slug) -> Result<Option<Summary>> {
 
 fn words_of(conn: &Connection, slugs: &[Slug]) -> Result<BTreeMap<Slug, String>> {
     let wanted = serde_json::json!(slugs).to_string();
-    let sql = "SELECT slug, fit.estimator, source.kind
+    let sql = "SELECT slug, fit.estimator, source.kind, fit.curve,
+                   EXISTS (SELECT 1 FROM curve AS own
+                           WHERE own.revision_id = revision.id AND own.name = render)
                FROM json_each(?1) CROSS JOIN material ON slug = json_each.value
-               JOIN revision ON material_id = material.id AND number = current_revision
-               JOIN fit ON fit.revision_id = revision.id AND fit.name = render
-               JOIN curve ON curve.revision_id = revision.id AND curve.name = fit.curve
-               JOIN source ON source.revision_id = revision.id AND source.key = curve.source";
-    let found: Vec<(Slug, String)> = rows(conn, sql, [wanted], |row| {
-        let (estimator, kind): (String, SourceKind) = (row.get(1)?, row.get(2)?);
-        Ok((row.get(0)?, kind.words_beside(estimator != Fit::STATED)))
+               LEFT JOIN revision ON material_id = material.id AND number = current_revision
+               LEFT JOIN fit ON fit.revision_id = revision.id AND fit.name = render
+               LEFT JOIN curve ON curve.revision_id = revision.id AND curve.name = fit.curve
+               LEFT JOIN source ON source.revision_id = revision.id AND source.key = curve.source";
+    let found = rows(conn, sql, [wanted], |row| {
+        let slug: Slug = row.get(0)?;
+        let estimator: Option<String> = row.get(1)?;
+        let (kind, curve): (Option<SourceKind>, Option<String>) = (row.get(2)?, row.get(3)?);
+        let renders_a_curve: bool = row.get(4)?;
+        let words = match (&estimator, &curve, kind) {
+            (Some(estimator), Some(_), Some(kind)) => {
+                Some(kind.words_beside(estimator != Fit::STATED))
+            }
+            // A fit of no curve, or a curve.
+            (Some(_), None, _) => None,
+            (None, ..) if renders_a_curve => None,
+            _ => return Err(damaged(format!("what scenes render of `{slug}` is not there"))),
+        };
+        Ok(words.map(|words| (slug, words)))
     })?;
-    Ok(found.into_iter().collect())
+    Ok(found.into_iter().flatten().collect())
 }
 
 /// Materials whose rows in lists, searches or outlines differ from their current revision.

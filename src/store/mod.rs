@@ -32,6 +32,7 @@ mod repair;
 mod row_check;
 mod rows;
 mod tables;
+mod unreachable;
 mod write;
 
 pub use database::Store;

@@ -44,11 +44,18 @@ pub(super) fn history(conn: &Connection, slug: &Slug) -> Result<Vec<RevisionSumm
 }
 
 /// Number of the current revision of a material. Scans the table, so that a damaged index cannot hide it. `None` when
-/// the material does not exist.
+/// the material does not exist. Fails where a list has a material that has lost its row.
 pub(super) fn current_revision(conn: &Connection, slug: &Slug) -> Result<Option<u32>> {
-    conn.prepare_cached("SELECT current_revision FROM material NOT INDEXED WHERE slug = ?1")?
+    let found = conn
+        .prepare_cached("SELECT current_revision FROM material NOT INDEXED WHERE slug = ?1")?
         .query_row([slug.as_str()], |row| row.get(0))
-        .optional()
+        .optional()?;
+    if found.is_none()
+        && conn.prepare_cached("SELECT 1 FROM entry WHERE slug = ?1")?.exists([slug.as_str()])?
+    {
+        return Err(damaged(format!("`{slug}` is in the lists, but its own row is not there")));
+    }
+    Ok(found)
 }
 
 /// The greatest number of a revision of a material below this one.
@@ -58,11 +65,13 @@ pub(super) fn revision_before(conn: &Connection, slug: &Slug, number: u32) -> Re
     conn.query_row(sql, params![slug.as_str(), number], |row| row.get(0))
 }
 
-/// Which of these materials the database has, by one scan of the table.
+/// Which of these materials the database has, in its lists alone too, by one scan of the table.
 pub(super) fn present(conn: &Connection, slugs: &[Slug]) -> Result<Vec<Slug>> {
     let wanted = serde_json::json!(slugs).to_string();
-    let sql = "SELECT slug FROM material NOT INDEXED
-               WHERE slug IN (SELECT value FROM json_each(?1)) ORDER BY slug";
+    let sql =
+        "SELECT slug FROM material NOT INDEXED WHERE slug IN (SELECT value FROM json_each(?1))
+               UNION SELECT slug FROM entry WHERE slug IN (SELECT value FROM json_each(?1))
+               ORDER BY slug";
     rows(conn, sql, [wanted], |row| row.get(0))
 }
 
@@ -196,12 +205,24 @@ fn revision(
     let sql = "
         SELECT slug, name, class, description, licence, tags, frequency_min_hz, frequency_max_hz,
             theta_min_rad, theta_max_rad, render, number, content_hash, added_at, program_version,
-            revision.id, status, status_reason, superseded_by, finish, unknown
+            revision.id, status, status_reason, superseded_by, finish, unknown,
+            (SELECT max(number) FROM revision WHERE material_id = material.id)
         FROM material JOIN revision ON material_id = material.id
         WHERE slug = ?1 AND number = coalesce(?2, current_revision)";
     conn.prepare_cached(sql)?
-        .query_row(params![slug.as_str(), number], |row| Ok((row.get(15)?, stored(row)?)))
+        .query_row(params![slug.as_str(), number], |row| {
+            let (current, latest): (u32, u32) = (row.get(11)?, row.get(21)?);
+            match number {
+                None if current != latest => Err(not_latest(slug, current, latest)),
+                _ => Ok((row.get(15)?, stored(row)?)),
+            }
+        })
         .optional()
+}
+
+/// The error for a current revision that has later ones: those may withdraw the material.
+fn not_latest(slug: &Slug, current: u32, latest: u32) -> Error {
+    damaged(format!("`{slug}` has revision {current} as its current one, and a revision {latest}"))
 }
 
 /// A revision by its own row, without the rows of other tables.

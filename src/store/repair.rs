@@ -26,7 +26,8 @@ pub struct Repair {
 }
 
 impl Store {
-    /// Repairs what can be repaired, in one transaction. Removes nothing that was measured or fitted.
+    /// Repairs what can be repaired, in one transaction. Removes nothing that was measured or fitted: rows of lost
+    /// revisions stay until [`Store::remove_unreachable_rows`].
     /// Rebuilds indexes, views, units, lists, searches and statistics from the content of revisions. Rewrites a
     /// revision with damaged content if one of `at_hand` has its hash. Restores the lost row of a material from its
     /// row in the lists, if the content then has the stored hash. Where the current revision of a material is lost,
@@ -47,9 +48,14 @@ fn repair(conn: &mut Connection, row_check: &mut RowCheck, at_hand: &[Material])
     tx.pragma_update(None, "defer_foreign_keys", true)?;
     let before = damage(&tx)?;
     let mut repair = Repair::default();
+    let sound = if before.is_empty() { Vec::new() } else { sound_revisions(&tx) };
+    let at_hand: Vec<&Material> = at_hand.iter().chain(&sound).collect();
     repair.attempt(&tx, "tables, indexes and views", || own_schema(&tx, row_check))?;
     repair.attempt(&tx, "indexes", || tx.execute_batch("REINDEX").map(|()| Vec::new()))?;
     repair.attempt(&tx, "units of columns", || units(&tx, row_check))?;
+    for renamed in renamed_materials(&tx)? {
+        repair.attempt(&tx, &renamed.slug, || renamed_material(&tx, &renamed))?;
+    }
     for lost in lost_materials(&tx)? {
         repair.attempt(&tx, &lost.slug, || lost_material(&tx, &lost))?;
     }
@@ -63,7 +69,8 @@ fn repair(conn: &mut Connection, row_check: &mut RowCheck, at_hand: &[Material])
         }
     }
     for slug in &slugs {
-        repair.attempt(&tx, slug.as_str(), || revisions(&tx, row_check, slug, at_hand))?;
+        repair.attempt(&tx, slug.as_str(), || revisions(&tx, row_check, slug, &at_hand))?;
+        repair.attempt(&tx, slug.as_str(), || latest_revision(&tx, slug))?;
         repair.attempt(&tx, slug.as_str(), || lost_current_revision(&tx, slug))?;
     }
     repair.attempt(&tx, "lists and searches", || lists(&tx, &slugs))?;
@@ -133,6 +140,64 @@ fn units(tx: &Transaction, row_check: &RowCheck) -> Result<Vec<String>> {
     Ok(vec!["units of columns were written anew".to_owned()])
 }
 
+/// Every revision with its stored hash. A table and its indexes may differ, and one of the two is lost when indexes are
+/// made anew.
+fn sound_revisions(tx: &Transaction) -> Vec<Material> {
+    let named: Vec<String> =
+        rows(tx, "SELECT slug FROM material", [], |row| row.get(0)).unwrap_or_default();
+    let mut sound = Vec::new();
+    for slug in named.iter().filter_map(|name| name.parse::<Slug>().ok()) {
+        let sql = "SELECT number FROM revision JOIN material ON material.id = material_id WHERE slug = ?1";
+        let numbers: Vec<u32> =
+            rows(tx, sql, [slug.as_str()], |row| row.get(0)).unwrap_or_default();
+        let read =
+            numbers.iter().filter_map(|number| read::get_in(tx, &slug, Some(*number)).ok()?);
+        sound.extend(read.filter(is_as_stored).map(|stored| stored.material));
+    }
+    sound
+}
+
+fn is_as_stored(stored: &StoredRevision) -> bool {
+    stored.material.content_hash() == stored.content_hash
+}
+
+/// Materials that the lists have under another name.
+fn renamed_materials(tx: &Transaction) -> Result<Vec<LostMaterial>> {
+    let sql = "SELECT material_id, entry.slug, revision FROM entry
+               JOIN material NOT INDEXED ON material.id = material_id
+               WHERE material.slug <> entry.slug";
+    rows(tx, sql, [], |row| {
+        Ok(LostMaterial { id: row.get(0)?, slug: row.get(1)?, revision: row.get(2)? })
+    })
+}
+
+/// Gives a material the name that the lists have, where its content then has the stored hash.
+fn renamed_material(tx: &Transaction, renamed: &LostMaterial) -> Result<Vec<String>> {
+    let LostMaterial { id, slug, .. } = renamed;
+    tx.execute_batch("SAVEPOINT renamed")?;
+    tx.execute("UPDATE material SET slug = ?2 WHERE id = ?1", params![id, slug])?;
+    let stored = slug.parse().ok().and_then(|name: Slug| read::get_in(tx, &name, None).ok()?);
+    if stored.as_ref().is_some_and(is_as_stored) {
+        tx.execute_batch("RELEASE renamed")?;
+        return Ok(vec![format!("`{slug}` has its name again")]);
+    }
+    tx.execute_batch("ROLLBACK TO renamed; RELEASE renamed")?;
+    Ok(Vec::new())
+}
+
+/// Makes the latest revision of a material the current one.
+fn latest_revision(tx: &Transaction, slug: &Slug) -> Result<Vec<String>> {
+    let sql = "UPDATE material SET current_revision =
+                   (SELECT max(number) FROM revision WHERE material_id = material.id)
+               WHERE slug = ?1 AND current_revision <
+                   (SELECT max(number) FROM revision WHERE material_id = material.id)";
+    let changed = tx.execute(sql, [slug.as_str()])?;
+    Ok((changed > 0)
+        .then(|| format!("the latest revision of `{slug}` is its current one again"))
+        .into_iter()
+        .collect())
+}
+
 /// A material that has revisions but no row of its own, as the lists have it.
 struct LostMaterial {
     id: i64,
@@ -166,7 +231,7 @@ fn lost_material(tx: &Transaction, lost: &LostMaterial) -> Result<Vec<String>> {
     // The hash covers the name: a wrong name is not restored.
     let name = slug.parse::<Slug>().ok();
     let stored = name.and_then(|name| read::get_in(tx, &name, None).ok().flatten());
-    if stored.is_some_and(|stored| stored.material.content_hash() == stored.content_hash) {
+    if stored.as_ref().is_some_and(is_as_stored) {
         tx.execute_batch("RELEASE lost")?;
         return Ok(vec![format!("`{slug}` has its row again")]);
     }
@@ -182,6 +247,9 @@ fn unreachable_lines(tx: &Transaction) -> Result<Vec<String>> {
         &format!("DELETE FROM entry WHERE material_id {condition} {of_no_revision}"),
         [],
     )?;
+    for table in ["entry_tag", "outline"] {
+        tx.execute(&format!("DELETE FROM {table} WHERE slug NOT IN (SELECT slug FROM entry)"), [])?;
+    }
     tx.execute(&format!("DELETE FROM search WHERE rowid {condition}"), [])?;
     Ok((lines > 0)
         .then(|| format!("{lines} of the lines of lists were of no material and were removed"))
@@ -200,7 +268,7 @@ fn lost_current_revision(tx: &Transaction, slug: &Slug) -> Result<Vec<String>> {
     let numbers: Vec<u32> = rows(tx, sql, [slug.as_str()], |row| row.get(0))?;
     for number in numbers {
         let stored = read::get_in(tx, slug, Some(number)).ok().flatten();
-        let sound = stored.filter(|stored| stored.material.content_hash() == stored.content_hash);
+        let sound = stored.filter(is_as_stored);
         if let Some(StoredRevision { material, activity, content_hash, .. }) = sound {
             let repeated = Input { name: format!("{slug}@{number}"), hash: content_hash };
             let by = Activity {
@@ -223,7 +291,7 @@ fn revisions(
     tx: &Transaction,
     row_check: &mut RowCheck,
     slug: &Slug,
-    at_hand: &[Material],
+    at_hand: &[&Material],
 ) -> Result<Vec<String>> {
     let sql = "SELECT revision.id, number, content_hash FROM revision
                JOIN material ON material.id = material_id WHERE slug = ?1 ORDER BY number";

@@ -8,6 +8,7 @@ use rusqlite::{
 };
 use serde::Serialize;
 
+use super::damage::check_pages;
 use super::error::is_damage;
 use super::find::outline::{self, OutlineEntry};
 use super::record::{Addition, Removal};
@@ -145,6 +146,7 @@ fn bring_to_one_value(tx: &Transaction, revision_id: i64) -> Result<()> {
 /// Removes materials with all their rows, all or none.
 pub(super) fn remove(conn: &mut Connection, slugs: &[&Slug]) -> Result<Vec<Option<Removal>>> {
     let tx = conn.transaction()?;
+    check_pages(&tx)?;
     let removed = slugs.iter().map(|slug| remove_one(&tx, slug)).collect::<Result<_>>()?;
     tx.commit()?;
     Ok(removed)
@@ -154,10 +156,21 @@ fn remove_one(tx: &Transaction, slug: &Slug) -> Result<Option<Removal>> {
     // Without an index, a damaged material can be removed, too.
     let sql = "SELECT id FROM material NOT INDEXED WHERE slug = ?1";
     let found = tx.query_row(sql, [slug.as_str()], |row| row.get::<_, i64>(0)).optional()?;
-    let Some(material_id) = found else { return Ok(None) };
+    // Where its own row is lost, a list has its number.
+    let listed = "SELECT material_id FROM entry WHERE slug = ?1";
+    let listed = tx.query_row(listed, [slug.as_str()], |row| row.get::<_, i64>(0)).optional()?;
+    let Some(material_id) = found.or(listed) else { return Ok(None) };
     let count = "SELECT count(*) FROM revision NOT INDEXED WHERE material_id = ?1";
     let revisions = tx.query_row(count, [material_id], |row| row.get(0))?;
     tx.execute("DELETE FROM material WHERE id = ?1", [material_id])?;
+    if found.is_none() {
+        tx.execute("DELETE FROM entry WHERE slug = ?1", [slug.as_str()])?;
+        tx.execute(
+            "DELETE FROM revision WHERE material_id = ?1
+             AND material_id NOT IN (SELECT id FROM material)",
+            [material_id],
+        )?;
+    }
     Ok(Some(Removal { revisions }))
 }
 

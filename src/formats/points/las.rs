@@ -135,9 +135,17 @@ fn extra_columns(header: &Header, mut left: usize) -> Vec<Extra> {
     let mut columns = Vec::new();
     for entry in described.map_or(&[][..], |v| &v.data).chunks_exact(DESCRIPTION_BYTES) {
         let (kind, options) = (entry[2], entry[3]);
-        let size = SIZES.get(usize::from(kind)).copied().unwrap_or(0);
-        // Kind 0 is bytes without a meaning, as many as the options say.
-        let taken = if kind == 0 { usize::from(options) } else { size };
+        let kind_of_each = if kind == 0 { 0 } else { (kind - 1) % 10 + 1 };
+        let size_of_each = SIZES[usize::from(kind_of_each)];
+        let (size, taken) = match kind {
+            // Bytes without a meaning, as many as the options say.
+            0 => (0, usize::from(options)),
+            1..=10 => (size_of_each, size_of_each),
+            // Two or three values, which no column of ours has: deprecated, and still written.
+            11..=20 => (0, 2 * size_of_each),
+            21..=30 => (0, 3 * size_of_each),
+            _ => (0, 0),
+        };
         if taken == 0 || taken > left {
             break;
         }
