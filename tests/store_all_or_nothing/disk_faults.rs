@@ -6,14 +6,13 @@ use std::path::Path;
 use matdb::adopt::{CatalogueImport, DatabaseCheck};
 use matdb::brdf::{Brdf, Lambert, Sum};
 use matdb::catalogue::{About, Probe, Rank, publish, verify};
-use matdb::error::Error;
 use matdb::material::Material;
 use matdb::setup::Database;
 use matdb::store::{Filter, Store};
 
 use crate::disk::{Fault, watch};
 use crate::support::database::{change, contents, is_sound, lit, sound};
-use crate::writes::{WRITES, Write, by_campaign};
+use crate::writes::{Failure, WRITES, Write, by_campaign};
 
 /// Removes a database with what SQLite keeps beside it.
 fn remove(path: &Path) {
@@ -90,7 +89,7 @@ fn the_power_may_be_cut_at_any_change_of_the_disk() {
 }
 
 /// What a database holds, as its reader says.
-fn answer(path: &Path) -> Result<Vec<Material>, Error> {
+fn answer(path: &Path) -> Result<Vec<Material>, Failure> {
     let Some(store) = Store::open_existing(path)? else { return Ok(Vec::new()) };
     let mut held = Vec::new();
     for summary in store.list()? {
@@ -138,7 +137,7 @@ fn a_disk_that_lies_about_what_it_has_stored_leaves_no_damage_unseen() {
 }
 
 /// A command that reads: all that it answers.
-type Read = fn(&Path) -> Result<String, Box<dyn std::error::Error>>;
+type Read = fn(&Path) -> Result<String, Failure>;
 
 const READS: [(&str, Read); 9] = [
     ("show", |path| Ok(format!("{:?}", answer(path)?))),
@@ -178,8 +177,8 @@ const READS: [(&str, Read); 9] = [
     }),
 ];
 
-fn opened(path: &Path) -> Result<Store, Error> {
-    Store::open_existing(path)?.ok_or_else(|| Error::NoDatabase { path: path.to_owned() })
+fn opened(path: &Path) -> Result<Store, Failure> {
+    Store::open_existing(path)?.ok_or_else(|| "there is no database".into())
 }
 
 #[test]
@@ -224,8 +223,11 @@ fn a_repair_is_done_or_not() {
     let conn = rusqlite::Connection::open(&before).unwrap();
     conn.execute_batch("DELETE FROM unit WHERE column_name < 'p'; DROP VIEW v_curves").unwrap();
     drop(conn);
-    let repair =
-        |path: &Path| DatabaseCheck { repair: true }.run(&Database::new(Some(path)), &mut |_| ());
+    let repair = |path: &Path| -> Result<bool, Failure> {
+        let check = DatabaseCheck { repair: true };
+        let report = check.run(&Database::new(Some(path)), &mut |_| ())?;
+        Ok(report.findings.is_empty())
+    };
     for fault in [Fault::Once, Fault::Half, Fault::Full, Fault::PowerCut] {
         for call in (1..).step_by(by_campaign(1, 31)) {
             remove(&path);
@@ -236,7 +238,7 @@ fn a_repair_is_done_or_not() {
                 disk.leave_after_cut(call);
             }
             assert_eq!(contents(&path), right, "{fault:?} at call {call}");
-            if result.is_ok_and(|report| report.findings.is_empty()) {
+            if result.is_ok_and(|is_mended| is_mended) {
                 assert!(is_whole(&path), "{fault:?} at call {call}: claims to have mended it");
             }
             if !disk.has_failed() {

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 
 use matdb::adopt::Withdrawal;
 use matdb::catalogue::Import;
-use matdb::error::Error;
 use matdb::material::{Activity, Material, Status};
 use matdb::setup::Database;
 use matdb::store::{Store, StoreError};
@@ -16,6 +15,9 @@ use crate::support::root;
 fn changed(slug: &str) -> Material {
     change(with_effects(slug))
 }
+
+/// An error of any call.
+pub type Failure = Box<dyn std::error::Error>;
 
 /// A call that writes.
 #[derive(Clone, Copy, Debug)]
@@ -92,7 +94,7 @@ impl Write {
     }
 
     /// Writes; `arm` is called when all that only reads is done.
-    pub fn run(self, path: &Path, arm: impl Fn()) -> Result<(), Error> {
+    pub fn run(self, path: &Path, arm: impl Fn()) -> Result<(), Failure> {
         if let Write::Import = self {
             let by = Activity { command: "import".to_owned(), inputs: vec![], origin: None };
             let import = Import::open(&theirs(path))?;
@@ -105,7 +107,8 @@ impl Write {
         if let Write::Withdraw = self {
             let (name, reason) = ("subject".to_owned(), REASON.to_owned());
             let withdrawal = Withdrawal { name, reason, superseded_by: None };
-            return withdrawal.store(&Database::new(Some(path))).map(drop);
+            withdrawal.store(&Database::new(Some(path)))?;
+            return Ok(());
         }
         let mut store = Store::open(path)?;
         match self {
