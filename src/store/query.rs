@@ -95,13 +95,13 @@ impl Store {
         damage::damage(&self.conn).in_file(&self.path)
     }
 
-    /// Whether a material of that name exists, sound or damaged.
+    /// Whether a material of that name exists, sound or damaged, in the lists alone too.
     ///
     /// # Errors
     /// When the file cannot be read.
     pub fn holds(&self, slug: &Slug) -> Result<bool, StoreError> {
-        let current = read::current_revision(&self.conn, slug);
-        Ok(current.in_file(&self.path)?.is_some())
+        let found = read::present(&self.conn, std::slice::from_ref(slug));
+        Ok(!found.in_file(&self.path)?.is_empty())
     }
 
     /// Every revision of a material, oldest first; none when there is no such material.
