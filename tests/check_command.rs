@@ -4,21 +4,9 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::{self, matdb};
+use crate::support::{self, curve, matdb};
 use rusqlite::Connection;
 use serde_json::Value;
-
-/// Two lobes at 61 angles, without noise.
-fn curve() -> String {
-    let mut text = "theta_deg,sigma0_db\n".to_owned();
-    for step in 0..=60 {
-        let theta_rad = f64::from(step).to_radians();
-        let brdf = 5.0 * (-(theta_rad.tan() / 0.05).powi(2)).exp() + 0.01 * theta_rad.cos().powi(3);
-        let sigma0 = 4.0 * std::f64::consts::PI * brdf * theta_rad.cos().powi(2);
-        text += &format!("{step},{:.4}\n", 10.0 * sigma0.log10());
-    }
-    text
-}
 
 fn database() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();

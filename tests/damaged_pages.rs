@@ -18,7 +18,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use crate::support::database::{change, complete, lit, refitted, sound, with_effects};
-use crate::support::{matdb, root};
+use crate::support::{matdb, root, tree};
 use matdb::material::{Material, Slug, Status};
 use matdb::store::Store;
 use rand::rngs::ChaCha8Rng;
@@ -60,24 +60,6 @@ const EACH: usize = 9;
 const SAMPLE: usize = 15;
 /// Time that a command may take, s.
 const MOST_S: u64 = 60;
-
-/// Every file below a folder, by its path.
-fn tree(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let mut found = BTreeMap::new();
-    let mut folders = vec![folder.to_owned()];
-    while let Some(at) = folders.pop() {
-        for entry in fs::read_dir(&at).into_iter().flatten() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-            } else {
-                let bytes = fs::read(&path).unwrap();
-                found.insert(path.strip_prefix(folder).unwrap().to_owned(), bytes);
-            }
-        }
-    }
-    found
-}
 
 fn write_tree(folder: &Path, files: &BTreeMap<PathBuf, Vec<u8>>) {
     for (path, bytes) in files {

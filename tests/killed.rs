@@ -19,7 +19,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use crate::support::database::{change, contents, is_sound, lit, sound};
-use crate::support::{matdb, root};
+use crate::support::{curve, matdb, root, tree};
 use matdb::material::Material;
 use matdb::store::{Store, StoreError};
 
@@ -127,18 +127,6 @@ const PLATE: &str = "[radar.scan]\npattern = \"raster\"\nlines = 30\nchirps_per_
     height_m = 0.4\n[radar.receiver]\n[[mesh]]\nname = \"plate\"\nfile = \"builtin:plate\"\n\
     size_m = [0.6, 0.6, 0]\ntranslation_m = [0, 1.1, 0]\n[[region]]\nname = \"all\"\nmaterial = \"steel\"\n";
 
-/// Two lobes at 61 angles, without noise.
-fn curve() -> String {
-    let mut text = "theta_deg,sigma0_db\n".to_owned();
-    for step in 0..=60 {
-        let theta_rad = f64::from(step).to_radians();
-        let brdf = 5.0 * (-(theta_rad.tan() / 0.05).powi(2)).exp() + 0.01 * theta_rad.cos().powi(3);
-        let sigma0 = 4.0 * std::f64::consts::PI * brdf * theta_rad.cos().powi(2);
-        text += &format!("{step},{:.4}\n", 10.0 * sigma0.log10());
-    }
-    text
-}
-
 /// A folder with all that the commands need.
 fn base() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
@@ -184,24 +172,6 @@ fn base() -> tempfile::TempDir {
     }
     run("diagnose cloud.ply --scene scene.toml --effects fov-gain --no-controls -o report");
     folder
-}
-
-/// Every file below a folder, by its path.
-fn tree(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let mut found = BTreeMap::new();
-    let mut folders = vec![folder.to_owned()];
-    while let Some(at) = folders.pop() {
-        for entry in fs::read_dir(&at).into_iter().flatten() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                folders.push(path);
-            } else {
-                let bytes = fs::read(&path).unwrap();
-                found.insert(path.strip_prefix(folder).unwrap().to_owned(), bytes);
-            }
-        }
-    }
-    found
 }
 
 fn copy(from: &Path, to: &Path) {

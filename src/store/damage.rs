@@ -4,7 +4,7 @@ use rusqlite::{Connection, Result};
 
 use super::error::{is_damage, reason};
 use super::find::stale;
-use super::read::damaged;
+use super::read::{damaged, not_latest};
 use super::rows::rows;
 
 /// Every problem of a file as a sentence: damaged pages, references to missing rows, current revisions that are not the
@@ -39,7 +39,7 @@ pub(super) fn damage(conn: &Connection) -> Result<Vec<String>> {
                HAVING current_revision <> max(number) ORDER BY slug";
     let mut problems = rows(conn, sql, [], |row| {
         let (slug, current, latest): (String, u32, u32) = (row.get(0)?, row.get(1)?, row.get(2)?);
-        Ok(format!("`{slug}` has revision {current} as its current one, and a revision {latest}"))
+        Ok(not_latest(&slug, current, latest))
     })?;
     let stale = stale(conn)?.into_iter();
     problems.extend(
@@ -48,8 +48,8 @@ pub(super) fn damage(conn: &Connection) -> Result<Vec<String>> {
     Ok(problems)
 }
 
-/// Largest database whose pages are all looked at before one is written, bytes. This takes as long for each as to read
-/// every row.
+/// Largest database whose pages are all looked at before one is written, bytes. The look takes as long as reading every
+/// row.
 const MOST_LOOKED_AT_BYTES: i64 = 8 << 20;
 
 /// Fails where pages of a database contradict each other, such as cells that overlap: whoever writes one of them would

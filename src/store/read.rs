@@ -213,16 +213,18 @@ fn revision(
         .query_row(params![slug.as_str(), number], |row| {
             let (current, latest): (u32, u32) = (row.get(11)?, row.get(21)?);
             match number {
-                None if current != latest => Err(not_latest(slug, current, latest)),
+                None if current != latest => {
+                    Err(damaged(not_latest(slug.as_str(), current, latest)))
+                }
                 _ => Ok((row.get(15)?, stored(row)?)),
             }
         })
         .optional()
 }
 
-/// The error for a current revision that has later ones: those may withdraw the material.
-fn not_latest(slug: &Slug, current: u32, latest: u32) -> Error {
-    damaged(format!("`{slug}` has revision {current} as its current one, and a revision {latest}"))
+/// The problem of a current revision that has later ones: those may withdraw the material.
+pub(super) fn not_latest(slug: &str, current: u32, latest: u32) -> String {
+    format!("`{slug}` has revision {current} as its current one, and a revision {latest}")
 }
 
 /// A revision by its own row, without the rows of other tables.

@@ -159,3 +159,33 @@ pub fn list_hashes(site: &Path) {
     }
     std::fs::write(site.join("SHA256SUMS"), lines.concat()).unwrap();
 }
+
+/// Every file below a folder, by its path.
+pub fn tree(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(at) = folders.pop() {
+        for entry in std::fs::read_dir(&at).into_iter().flatten() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let bytes = std::fs::read(&path).unwrap();
+                found.insert(path.strip_prefix(folder).unwrap().to_owned(), bytes);
+            }
+        }
+    }
+    found
+}
+
+/// Two lobes at 61 angles, without noise.
+pub fn curve() -> String {
+    let mut text = "theta_deg,sigma0_db\n".to_owned();
+    for step in 0..=60 {
+        let theta_rad = f64::from(step).to_radians();
+        let brdf = 5.0 * (-(theta_rad.tan() / 0.05).powi(2)).exp() + 0.01 * theta_rad.cos().powi(3);
+        let sigma0 = 4.0 * std::f64::consts::PI * brdf * theta_rad.cos().powi(2);
+        text += &format!("{step},{:.4}\n", 10.0 * sigma0.log10());
+    }
+    text
+}
