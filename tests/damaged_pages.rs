@@ -1089,7 +1089,10 @@ fn judge(lab: &Laboratory, case: usize) -> Vec<String> {
     // A log may hold the last change whole or not: then everything is as it was before that change.
     let alternatives = [&lab.answers, &lab.older_answers];
     let alternatives = &alternatives[..if kind.contains("log") { 2 } else { 1 }];
-    let judged = alternatives.iter().map(|expected| (wrong(lab, expected, &got), *expected));
+    // Pages of the earlier state that agree with each other are a sound database of that state.
+    let earlier = kind.contains("before").then_some(&lab.older_answers[..]);
+    let judged =
+        alternatives.iter().map(|expected| (wrong(lab, expected, earlier, &got), *expected));
     let (wrong, expected) = judged.min_by_key(|(wrong, _)| wrong.len()).unwrap();
     problems.extend(wrong);
     problems.extend(wrong_revisions(lab, folder.path()));
@@ -1100,12 +1103,20 @@ fn judge(lab: &Laboratory, case: usize) -> Vec<String> {
     problems.into_iter().map(name).collect()
 }
 
-/// What is wrong with answers, by those of a sound database.
-fn wrong(lab: &Laboratory, expected: &[Answer], got: &[Answer]) -> Vec<String> {
+/// What is wrong with answers, by those of a sound database, or of an `earlier` one.
+fn wrong(
+    lab: &Laboratory,
+    expected: &[Answer],
+    earlier: Option<&[Answer]>,
+    got: &[Answer],
+) -> Vec<String> {
     let commands = reading();
     let mut wrong = Vec::new();
     let mut other = Vec::new();
-    for ((command, expected), got) in commands.iter().zip(expected).zip(got) {
+    for (place, ((command, expected), got)) in commands.iter().zip(expected).zip(got).enumerate() {
+        if earlier.is_some_and(|earlier| got.is_right(&earlier[place])) {
+            continue;
+        }
         wrong.extend(got.fault().map(|fault| format!("`{command}` {fault}")));
         let is_publication = command.starts_with("publish");
         if got.is_done() && !got.is_right(expected) {
@@ -1242,8 +1253,9 @@ fn wrong_repair(lab: &Laboratory, at: &Path, repair: &Answer, expected: &[Answer
             .iter()
             .any(|name| command.contains(name) && (said.contains(&format!("`{name}` "))));
         let is_list = !NAMES.iter().any(|name| command.contains(name));
-        let is_lost = said.contains("has lost its revision") && is_list;
-        if !is_named && !is_lost && !got.is_same(expected) {
+        let is_changed =
+            ["has lost its revision", "than was stored"].iter().any(|words| said.contains(words));
+        if !is_named && !(is_changed && is_list) && !got.is_same(expected) {
             wrong.push(format!(
                 "is done, and `{command}` then says something else: {}{}",
                 got.stderr,

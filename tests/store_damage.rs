@@ -557,3 +557,140 @@ fn a_whole_revision_is_shown_though_the_current_one_is_damaged() {
         assert!(notices.contains("the current revision of `cotton` is damaged: "), "{notices}");
     }
 }
+
+/// A database with one material of two revisions, each with the command that made it.
+fn recorded() -> (tempfile::TempDir, PathBuf, Material) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("matdb.sqlite");
+    let by = |command: &str| Activity {
+        command: command.to_owned(),
+        inputs: vec![Input { name: "own.csv".to_owned(), hash: "0".repeat(64) }],
+        origin: None,
+    };
+    let last = change(sound("own"));
+    let mut store = Store::open(&path).unwrap();
+    store.add_made(&[(sound("own"), by("measure")), (last.clone(), by("fit"))]).unwrap();
+    (folder, path, last)
+}
+
+#[test]
+fn a_revision_with_another_record_is_not_shown_and_a_repair_says_that_it_was_there() {
+    for change in [
+        "UPDATE revision SET added_at = '2001-01-01T00:00:00Z' WHERE number = 2",
+        "UPDATE revision SET program_version = '9.9.9' WHERE number = 2",
+        "UPDATE revision SET record_hash = NULL WHERE number = 2",
+        "UPDATE activity SET command = 'import' WHERE command = 'fit'",
+        "DELETE FROM activity WHERE command = 'fit'",
+        "UPDATE activity_input SET name = 'another.csv' WHERE revision_id = 2",
+        "DELETE FROM activity_input WHERE revision_id = 2",
+        "INSERT INTO origin (revision_id, revision, added_at, program_version)
+         VALUES (2, 1, '2001-01-01T00:00:00Z', '0.1.0')",
+    ] {
+        let (folder, path, material) = recorded();
+        tamper(&path, change);
+        let damaged = fs::read(&path).unwrap();
+        for command in ["show own", "show own@2 --json", "history own", "publish site", "check"] {
+            let output = matdb(folder.path()).args(command.split(' ')).output().unwrap();
+            let text = [output.stdout, output.stderr].concat();
+            let text = String::from_utf8_lossy(&text);
+            assert!(!output.status.success(), "{change}: {command}: {text}");
+            let is_named = text.contains("origin than was stored");
+            assert!(is_named || command.starts_with("publish"), "{change}: {command}: {text}");
+        }
+        matdb(folder.path()).args(["check", "--repair"]).assert().success();
+        assert!(is_sound(&path), "{change}");
+        let stored = Store::open(&path).unwrap().get(&material.slug, None).unwrap().unwrap();
+        assert_eq!(stored.activity.unwrap().command, "check --repair", "{change}");
+        assert_eq!(stored.revision, 2);
+
+        fs::write(&path, damaged).unwrap();
+        let mut store = Store::open(&path).unwrap();
+        assert_eq!(store.add([&material]).unwrap(), [Addition::Repaired(2)], "{change}");
+        assert!(is_sound(&path), "{change}");
+    }
+}
+
+#[test]
+fn revisions_under_other_numbers_are_refused_and_never_taken_for_what_they_are_called() {
+    let (folder, path, material) = recorded();
+    tamper(
+        &path,
+        "UPDATE revision SET number = number + 10; UPDATE revision SET number = 13 - number",
+    );
+    refused(matdb(folder.path()).args(["show", "own"]));
+    refused(matdb(folder.path()).args(["show", "own@1"]));
+    let output = matdb(folder.path()).args(["check", "--repair"]).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stdout).into_owned()
+        + &String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success() && text.contains("stored under another number"), "{text}");
+    refused(matdb(folder.path()).args(["show", "own"]));
+    // What is added gets a number of its own.
+    let mut store = Store::open(&path).unwrap();
+    assert_eq!(store.add([&material]).unwrap(), [Addition::Revision(3)]);
+    assert_eq!(store.get(&material.slug, None).unwrap().unwrap().material, material);
+}
+
+#[test]
+fn lists_and_searches_that_say_something_else_are_refused_until_they_are_repaired() {
+    let readers = [
+        "list --json",
+        "list --class metal",
+        "list --tag dielectric",
+        "search ptfe",
+        "near --material cotton",
+    ];
+    for (change, reading) in [
+        ("UPDATE entry SET name = 'Another name' WHERE slug = 'glass'", &readers[..]),
+        ("UPDATE entry SET status = 'withdrawn' WHERE slug = 'glass'", &readers[..]),
+        ("DELETE FROM entry WHERE slug = 'glass'", &readers[..]),
+        ("DELETE FROM entry_tag WHERE slug = 'glass'", &readers[2..3]),
+        ("DELETE FROM search WHERE slug = 'glass'", &readers[3..4]),
+        ("UPDATE search SET description = 'ptfe' WHERE slug = 'glass'", &readers[3..4]),
+        (
+            "UPDATE outline SET levels = (SELECT levels FROM outline WHERE slug = 'ptfe')
+             WHERE slug = 'glass'",
+            &readers[4..],
+        ),
+        ("DELETE FROM outline WHERE slug = 'glass'", &readers[4..]),
+    ] {
+        let (folder, path) = database(&["ptfe", "glass", "steel", "cotton"]);
+        for command in readers {
+            matdb(folder.path()).args(command.split(' ')).assert().success();
+        }
+        tamper(&path, change);
+        for command in reading {
+            let message = refused(matdb(folder.path()).args(command.split(' ')));
+            assert!(message.contains("`glass` is not what is stored"), "{change}: {message}");
+            assert!(message.contains("check --repair"), "{message}");
+        }
+        // A list of all materials shows the others.
+        let output = matdb(folder.path()).arg("list").output().unwrap();
+        let text = String::from_utf8_lossy(&output.stdout);
+        let is_called_damaged =
+            text.lines().any(|line| line.starts_with("glass ") && line.contains(" damaged "));
+        assert_eq!(is_called_damaged, change.starts_with("UPDATE entry"), "{change}: {text}");
+        assert_eq!(
+            output.status.success(),
+            !change.starts_with("DELETE FROM entry WHERE"),
+            "{change}"
+        );
+        matdb(folder.path()).args(["check", "--repair"]).assert().success();
+        for command in readers {
+            matdb(folder.path()).args(command.split(' ')).assert().success();
+        }
+    }
+}
+
+#[test]
+fn lists_show_the_others_where_one_material_cannot_be_read() {
+    let (folder, path) = database(&["cotton", "glass", "steel"]);
+    tamper(
+        &path,
+        "DELETE FROM revision WHERE material_id = (SELECT id FROM material WHERE slug = 'glass')",
+    );
+    for command in ["list", "list --json", "search metal"] {
+        let output = matdb(folder.path()).args(command.split(' ')).output().unwrap();
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success() && text.contains("steel"), "{command}: {text}");
+    }
+}

@@ -18,7 +18,7 @@ use matdb::store::{Addition, Store};
 use rusqlite::Connection;
 use rusqlite::functions::FunctionFlags;
 
-const NEWEST: &str = "schema-0014.sqlite";
+const NEWEST: &str = "schema-0015.sqlite";
 
 fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures")

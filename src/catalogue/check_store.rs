@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::problem::{Problem, problem};
 use crate::fit::again::{lacks_report, problems};
 use crate::material::Fit;
-use crate::store::{RevisionSummary, RowCheck, Store, StoreError, StoredRevision, Summary};
+use crate::store::{RowCheck, Store, StoreError, StoredRevision, Summary};
 
 /// How much was checked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -97,14 +97,14 @@ impl StoreCheck<'_> {
         count: &mut CheckCount,
         each: &mut impl FnMut(&Summary, &StoredRevision, &mut dyn FnMut(Problem)),
     ) -> Result<(), StoreError> {
-        let history = match store.history(&summary.slug) {
+        let numbers = match store.revision_numbers(&summary.slug) {
             Err(StoreError::Corrupt { problem: what, .. }) => {
                 (self.report)(problem(summary.slug.as_str(), what));
                 return Ok(());
             }
-            history => history?,
+            numbers => numbers?,
         };
-        for RevisionSummary { revision, .. } in history {
+        for revision in numbers {
             let place = format!("{}@{revision}", summary.slug);
             // Reading recomputes the hash.
             match store.get(&summary.slug, Some(revision)) {

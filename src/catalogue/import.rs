@@ -13,7 +13,7 @@ use super::read::{about, is_newer};
 use super::verify::{database, verify};
 use crate::effects::{Level, resolve};
 use crate::material::{Activity, Material, Origin, Slug};
-use crate::store::{Addition, RevisionSummary, Store, StoreError, StoredRevision};
+use crate::store::{Addition, Store, StoreError, StoredRevision};
 
 /// Another laboratory's catalogue that was [verified](super::verify()) and may be imported.
 #[derive(Debug)]
@@ -142,8 +142,7 @@ impl Import {
         slug: &Slug,
         name: Slug,
     ) -> Result<MaterialPlan, CatalogueError> {
-        let history = self.theirs.history(slug)?;
-        let added = Outcome::Added { revisions: history.len() };
+        let added = Outcome::Added { revisions: self.theirs.revision_numbers(slug)?.len() };
         let known = ours.map_or(Ok(None), |ours| ours.get(&name, None))?;
         let outcome = match (ours, known) {
             (Some(ours), Some(known)) => self.beside(ours, known, slug, &name)?,
@@ -162,8 +161,8 @@ impl Import {
     ) -> Result<Outcome, CatalogueError> {
         let Some(theirs) = self.revision(slug, None, name)? else { return Ok(Outcome::Unchanged) };
         let theirs = theirs.content_hash();
-        for revision in ours.history(name)? {
-            let once = ours.get(name, Some(revision.revision))?;
+        for revision in ours.revision_numbers(name)? {
+            let once = ours.get(name, Some(revision))?;
             if once.is_some_and(|once| once.content_hash == theirs) {
                 return Ok(Outcome::Unchanged);
             }
@@ -202,7 +201,7 @@ impl Import {
     /// Numbers of their revisions after the one with this content; none where they never had it.
     fn since(&self, slug: &Slug, name: &Slug, content: &str) -> Result<Vec<u32>, CatalogueError> {
         let mut since = None;
-        for RevisionSummary { revision, .. } in self.theirs.history(slug)? {
+        for revision in self.theirs.revision_numbers(slug)? {
             let Some(material) = self.revision(slug, Some(revision), name)? else { continue };
             match &mut since {
                 _ if material.content_hash() == content => since = Some(Vec::new()),
@@ -284,9 +283,7 @@ impl Import {
     ) -> Result<Vec<u32>, CatalogueError> {
         let MaterialPlan { slug, name, outcome } = taken;
         match outcome {
-            Outcome::Added { .. } => {
-                Ok(self.theirs.history(slug)?.into_iter().map(|line| line.revision).collect())
-            }
+            Outcome::Added { .. } => Ok(self.theirs.revision_numbers(slug)?),
             Outcome::Continued { .. } => {
                 match ours.map_or(Ok(None), |ours| ours.get(name, None))? {
                     Some(known) => self.since(slug, name, &known.content_hash),

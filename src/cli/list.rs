@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::material::{Slug, SourceKind};
 use crate::report::{MaterialList, MaterialRow, UnknownWord};
 use crate::setup::Database;
-use crate::store::Filter;
+use crate::store::{DAMAGED, Filter};
 
 /// List the materials in the database
 #[derive(Debug, clap::Args)]
@@ -84,6 +84,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let filter = args.filter.filter();
     let store = db.read()?;
     if console.json {
+        store.as_ref().map_or(Ok(()), |store| store.check_lists(&filter))?;
         let materials = match (&store, args.limit) {
             (None, _) => Vec::new(),
             (Some(store), Some(most)) => store.page(&filter, most)?,
@@ -148,7 +149,8 @@ fn row(MaterialRow { summary: m, kind }: &MaterialRow) -> [String; 8] {
     [
         m.slug.to_string(),
         m.revision.to_string(),
-        with_status(kind, &m.status),
+        // A line that is not what is stored may have any status.
+        if kind == DAMAGED { kind.clone() } else { with_status(kind, &m.status) },
         m.class.clone(),
         m.curves.to_string(),
         m.observations.to_string(),

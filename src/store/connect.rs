@@ -22,7 +22,7 @@ use crate::files::folder_of;
 const APPLICATION_ID: i64 = 0x6d61_7464;
 
 /// The latest schema.
-const LATEST: usize = 14;
+const LATEST: usize = 15;
 
 /// Every migration, oldest first. Append only: users have files of every schema.
 /// `fill` computes what older programs did not store. It runs at the latest schema, the only one that this program
@@ -42,8 +42,9 @@ fn schemas(fill: Backlog) -> [M<'static>; LATEST] {
         M::up(include_str!("../../migrations/0011_one_value.sql")),
         M::up(include_str!("../../migrations/0012_beam_of_a_curve.sql")),
         M::up(include_str!("../../migrations/0013_levels_of_a_curve.sql")),
+        M::up(include_str!("../../migrations/0014_identified.sql")),
         M::up_with_hook(
-            include_str!("../../migrations/0014_identified.sql"),
+            include_str!("../../migrations/0015_record.sql"),
             move |tx: &Transaction| Ok(fill.run(tx)?),
         ),
     ]
@@ -54,7 +55,7 @@ fn schemas(fill: Backlog) -> [M<'static>; LATEST] {
 struct Backlog {
     /// The schema of the file.
     schema: usize,
-    /// Revisions on damaged pages, of which no fit is read.
+    /// Revisions on damaged pages, of which neither fit nor record is read.
     torn: Vec<i64>,
 }
 
@@ -71,7 +72,7 @@ impl Backlog {
         if self.schema < Backlog::OUTLINES {
             outline::fill(tx)?;
         }
-        Ok(())
+        write::fill_records(tx, &self.torn)
     }
 }
 

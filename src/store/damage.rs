@@ -3,7 +3,7 @@
 use rusqlite::{Connection, Result};
 
 use super::error::{is_damage, reason};
-use super::find::stale;
+use super::find::stale::{problem, stale};
 use super::read::{damaged, not_latest};
 use super::rows::rows;
 
@@ -41,23 +41,23 @@ pub(super) fn damage(conn: &Connection) -> Result<Vec<String>> {
         let (slug, current, latest): (String, u32, u32) = (row.get(0)?, row.get(1)?, row.get(2)?);
         Ok(not_latest(&slug, current, latest))
     })?;
-    let stale = stale(conn)?.into_iter();
-    problems.extend(
-        stale.map(|slug| format!("what lists and searches say of `{slug}` is not what is stored")),
-    );
+    problems.extend(stale(conn)?.iter().map(|slug| problem(slug)));
     Ok(problems)
 }
 
-/// Largest database whose pages are all looked at before one is written, bytes. The look takes as long as reading every
-/// row.
+/// Largest database that is looked at, bytes. The look takes as long as reading every row.
 const MOST_LOOKED_AT_BYTES: i64 = 8 << 20;
+
+/// Whether a database is looked at before it is used.
+pub(super) fn is_small(conn: &Connection) -> Result<bool> {
+    let sql = "SELECT page_count * page_size FROM pragma_page_count, pragma_page_size";
+    conn.query_row(sql, [], |row| row.get::<_, i64>(0)).map(|bytes| bytes <= MOST_LOOKED_AT_BYTES)
+}
 
 /// Fails where pages of a database contradict each other, such as cells that overlap: whoever writes one of them would
 /// damage what is stored beside. Databases above 8 MiB are not looked at.
 pub(super) fn check_pages(conn: &Connection) -> Result<()> {
-    let sql = "SELECT page_count * page_size FROM pragma_page_count, pragma_page_size";
-    let bytes: i64 = conn.query_row(sql, [], |row| row.get(0))?;
-    if bytes > MOST_LOOKED_AT_BYTES {
+    if !is_small(conn)? {
         return Ok(());
     }
     let found = rows(conn, "PRAGMA quick_check", [], |row| row.get::<_, String>(0))?;

@@ -2,6 +2,7 @@
 
 mod filter;
 pub(super) mod outline;
+pub(super) mod stale;
 mod words;
 
 use std::collections::BTreeMap;
@@ -19,6 +20,9 @@ use filter::summary;
 pub use filter::Filter;
 pub use outline::OutlineEntry;
 pub use words::Match;
+
+/// What a list says in the place of the kind of a damaged material.
+pub const DAMAGED: &str = "damaged";
 
 impl Store {
     /// The current revisions of the materials that match a filter, sorted by name.
@@ -85,7 +89,7 @@ impl Store {
         for slug in slugs {
             match words_of(&self.conn, std::slice::from_ref(slug)) {
                 Err(error) if is_damage(&error) => {
-                    words.insert(slug.clone(), "damaged".to_owned());
+                    words.insert(slug.clone(), DAMAGED.to_owned());
                 }
                 found => words.extend(found.in_file(&self.path)?),
             }
@@ -145,23 +149,4 @@ fn words_of(conn: &Connection, slugs: &[Slug]) -> Result<BTreeMap<Slug, String>>
         Ok(words.map(|words| (slug, words)))
     })?;
     Ok(found.into_iter().flatten().collect())
-}
-
-/// Materials whose rows in lists, searches or outlines differ from their current revision.
-pub(super) fn stale(conn: &Connection) -> Result<Vec<String>> {
-    let sql = "
-        SELECT slug FROM (
-            SELECT slug, material_id, revision, name, class, status, kind, frequency_min_hz,
-                frequency_max_hz, curves, observations, fits, fitted FROM entry_made
-            EXCEPT SELECT * FROM entry)
-        UNION SELECT slug FROM entry WHERE material_id NOT IN (SELECT id FROM material)
-        UNION SELECT slug FROM (SELECT * FROM entry_tag_made EXCEPT SELECT * FROM entry_tag)
-        UNION SELECT slug FROM (SELECT * FROM entry_tag EXCEPT SELECT * FROM entry_tag_made)
-        UNION SELECT slug FROM (SELECT * FROM search_made EXCEPT SELECT rowid, * FROM search)
-        UNION SELECT slug FROM search WHERE rowid NOT IN (SELECT id FROM material)";
-    let mut stale: Vec<String> = rows(conn, sql, [], |row| row.get(0))?;
-    stale.extend(outline::stale(conn)?);
-    stale.sort();
-    stale.dedup();
-    Ok(stale)
 }

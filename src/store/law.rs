@@ -76,17 +76,19 @@ pub(super) fn left_in_structure(
     Ok(models)
 }
 
-/// The revisions with a fit on a damaged page. SQLite refuses to write within a transaction that has read such a page,
-/// so a migration must know them before it begins.
+/// The revisions with a fit or a record on a damaged page, in a file of an older schema. SQLite refuses to write within
+/// a transaction that has read such a page, so a migration must know them before it begins.
 pub(super) fn on_damaged_pages(conn: &Connection) -> Result<Vec<i64>> {
-    let sql = "SELECT count(*) = 3 AND (SELECT user_version FROM pragma_user_version) < 11 FROM sqlite_schema
-               WHERE name IN ('fit', 'fit_parameter', 'fit_covariance')";
-    if !conn.query_row(sql, [], |row| row.get::<_, bool>(0))? {
+    let sql = "SELECT name FROM sqlite_schema JOIN pragma_user_version WHERE type = 'table' AND (
+                   name IN ('activity', 'activity_input', 'origin', 'origin_author') AND user_version < 15
+                   OR name IN ('fit', 'fit_parameter', 'fit_covariance') AND user_version < 11)";
+    let tables: Vec<String> = rows(conn, sql, [], |row| row.get(0))?;
+    if tables.is_empty() {
         return Ok(Vec::new());
     }
     let mut torn = Vec::new();
     for revision_id in rows(conn, "SELECT id FROM revision", [], |row| row.get(0))? {
-        for table in ["fit", "fit_parameter", "fit_covariance"] {
+        for table in &tables {
             let sql = format!("SELECT * FROM {table} WHERE revision_id = ?1");
             let mut statement = conn.prepare(&sql)?;
             let columns = statement.column_count();

@@ -37,7 +37,7 @@ mod write;
 
 pub use database::Store;
 pub use error::StoreError;
-pub use find::{Filter, Match, OutlineEntry};
+pub use find::{DAMAGED, Filter, Match, OutlineEntry};
 pub use record::{Addition, Removal, RevisionSummary, StoredRevision, Summary};
 pub use repair::Repair;
 pub use row_check::{Difference, RowCheck};

@@ -29,7 +29,8 @@ impl Store {
     /// One revision of a material, or the current one. `None` when the material or the revision does not exist.
     ///
     /// # Errors
-    /// When the file cannot be read, holds something else than was stored, or has lost the revision.
+    /// When the file cannot be read, holds something else than was stored, or has lost the revision. The content, its
+    /// number, date and program, and the command that made it are compared with the hashes that were stored.
     pub fn get(
         &self,
         slug: &Slug,
@@ -104,10 +105,19 @@ impl Store {
         Ok(!found.in_file(&self.path)?.is_empty())
     }
 
-    /// Every revision of a material, oldest first; none when there is no such material.
+    /// Numbers of the revisions of a material, ascending; none when there is no such material.
     ///
     /// # Errors
     /// When the file cannot be read, or a material has no revision.
+    pub fn revision_numbers(&self, slug: &Slug) -> Result<Vec<u32>, StoreError> {
+        read::revision_numbers(&self.conn, slug).in_file(&self.path)
+    }
+
+    /// Every revision of a material, oldest first; none when there is no such material.
+    ///
+    /// # Errors
+    /// When the file cannot be read, a material has no revision, or a revision another number, date, program, command
+    /// or origin than was stored.
     pub fn history(&self, slug: &Slug) -> Result<Vec<RevisionSummary>, StoreError> {
         read::history(&self.conn, slug).in_file(&self.path)
     }

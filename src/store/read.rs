@@ -11,7 +11,7 @@ use rusqlite::{
 };
 
 use super::law;
-use super::record::{RevisionSummary, StoredRevision};
+use super::record::{Record, Recorded, RevisionSummary, StoredRevision};
 use super::rows::{json, optional_json, rows};
 use crate::brdf::Brdf;
 use crate::formats::EffectEntry;
@@ -20,27 +20,72 @@ use crate::material::{
 };
 use crate::radar::Footprint;
 
+/// Numbers of the revisions of a material, ascending.
+pub(super) fn revision_numbers(conn: &Connection, slug: &Slug) -> Result<Vec<u32>> {
+    let sql = "SELECT number FROM material JOIN revision ON material_id = material.id
+               WHERE slug = ?1 ORDER BY number";
+    let tx = Transaction::new_unchecked(conn, TransactionBehavior::Deferred)?;
+    let numbers: Vec<u32> = rows(&tx, sql, [slug.as_str()], |row| row.get(0))?;
+    if numbers.is_empty() {
+        check_absent(&tx, slug)?;
+    }
+    Ok(numbers)
+}
+
 /// Every revision of a material, oldest first.
 pub(super) fn history(conn: &Connection, slug: &Slug) -> Result<Vec<RevisionSummary>> {
-    let sql = "SELECT number, revision.added_at, revision.program_version, origin.revision_id, origin.title
+    let sql = "SELECT number, revision.added_at, revision.program_version, origin.revision_id, origin.title,
+                   revision.id
                FROM material JOIN revision ON material_id = material.id
                LEFT JOIN origin ON origin.revision_id = revision.id
                WHERE slug = ?1 ORDER BY number";
     let tx = Transaction::new_unchecked(conn, TransactionBehavior::Deferred)?;
-    let history: Vec<RevisionSummary> = rows(&tx, sql, [slug.as_str()], |row| {
+    let found: Vec<(i64, RevisionSummary)> = rows(&tx, sql, [slug.as_str()], |row| {
         let (of, title): (Option<i64>, Option<String>) = (row.get(3)?, row.get(4)?);
         let origin = of.map(|_| Origin { title, ..Origin::default() }.title().to_owned());
-        Ok(RevisionSummary {
+        let summary = RevisionSummary {
             origin,
             revision: row.get(0)?,
             added_at: row.get(1)?,
             program_version: row.get(2)?,
-        })
+        };
+        Ok((row.get(5)?, summary))
     })?;
-    if history.is_empty() {
+    if found.is_empty() {
         check_absent(&tx, slug)?;
     }
-    Ok(history)
+    let recorded = found.into_iter().map(|(id, summary)| check_record(&tx, id).map(|()| summary));
+    recorded.collect()
+}
+
+/// Fails where the record of a revision is not what was stored with its content.
+pub(super) fn check_record(conn: &Connection, revision_id: i64) -> Result<()> {
+    let found = recorded(conn, revision_id)?;
+    if found.is_as_stored() {
+        return Ok(());
+    }
+    let Record { slug, revision, .. } = found.record;
+    Err(damaged(format!(
+        "revision {revision} of `{slug}` has another number, date, program, command or origin than was stored"
+    )))
+}
+
+/// The record of a revision, and its hash.
+pub(super) fn recorded(conn: &Connection, revision_id: i64) -> Result<Recorded> {
+    let sql = "SELECT slug, number, content_hash, added_at, program_version, record_hash
+               FROM revision JOIN material ON material.id = material_id WHERE revision.id = ?1";
+    let activity = provenance::activity(conn, revision_id)?;
+    conn.prepare_cached(sql)?.query_row([revision_id], |row| {
+        let record = Record {
+            slug: row.get(0)?,
+            revision: row.get(1)?,
+            content_hash: row.get(2)?,
+            added_at: row.get(3)?,
+            program_version: row.get(4)?,
+            activity,
+        };
+        Ok(Recorded { record, hash: row.get(5)? })
+    })
 }
 
 /// Number of the current revision of a material. Scans the table, so that a damaged index cannot hide it. `None` when
@@ -109,15 +154,26 @@ pub(super) fn get(
 ) -> Result<Option<StoredRevision>> {
     // One transaction: another program may write meanwhile.
     let tx = Transaction::new_unchecked(conn, TransactionBehavior::Deferred)?;
-    get_in(&tx, slug, number)
+    let Some((revision_id, stored)) = found_in(&tx, slug, number)? else { return Ok(None) };
+    check_record(&tx, revision_id)?;
+    Ok(Some(stored))
 }
 
-/// Reads one revision of a material, or the current one, within a transaction.
+/// Reads one revision of a material, or the current one, within a transaction. Its record is not compared.
 pub(super) fn get_in(
     conn: &Connection,
     slug: &Slug,
     number: Option<u32>,
 ) -> Result<Option<StoredRevision>> {
+    Ok(found_in(conn, slug, number)?.map(|(_, stored)| stored))
+}
+
+/// As [`get_in`], with its number in the file.
+fn found_in(
+    conn: &Connection,
+    slug: &Slug,
+    number: Option<u32>,
+) -> Result<Option<(i64, StoredRevision)>> {
     let Some((revision_id, mut stored)) = revision(conn, slug, number)? else {
         // The current revision must exist. A number before it may be missing.
         return match current_revision(conn, slug)? {
@@ -135,7 +191,7 @@ pub(super) fn get_in(
     material.effects = effects(conn, revision_id)?;
     provenance::fill(material, conn, revision_id)?;
     stored.activity = provenance::activity(conn, revision_id)?;
-    Ok(Some(stored))
+    Ok(Some((revision_id, stored)))
 }
 
 /// What scenes render of a material's current revision.

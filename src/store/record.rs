@@ -1,5 +1,7 @@
 //! Plain data that the database returns: revisions, rows of lists, and results of writing.
 
+use serde::Serialize;
+
 use crate::material::{Activity, Material, Slug, SourceKind};
 
 /// Result of adding a material.
@@ -44,8 +46,49 @@ pub struct StoredRevision {
     pub activity: Option<Activity>,
 }
 
+/// What is stored with the content of a revision. New fields of an activity must leave the JSON of older ones as it is:
+/// files have its hash.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct Record {
+    pub slug: String,
+    pub revision: u32,
+    pub content_hash: String,
+    pub added_at: String,
+    pub program_version: String,
+    pub activity: Option<Activity>,
+}
+
+impl Record {
+    /// BLAKE3 of its JSON.
+    pub fn hash(&self) -> String {
+        // Serialising plain structs into memory has no way to fail.
+        blake3::hash(&serde_json::to_vec(self).unwrap_or_default()).to_hex().to_string()
+    }
+}
+
+/// A record as it is, and its hash as it was stored.
+pub(super) struct Recorded {
+    pub record: Record,
+    /// None where the record was damaged when its hash would have been computed.
+    pub hash: Option<String>,
+}
+
+impl Recorded {
+    pub fn is_as_stored(&self) -> bool {
+        self.hash.as_ref() == Some(&self.record.hash())
+    }
+
+    /// Whether it was stored under another number, of those up to `most`.
+    pub fn is_renumbered(&self, most: u32) -> bool {
+        (1..=most).filter(|number| *number != self.record.revision).any(|number| {
+            let other = Record { revision: number, ..self.record.clone() };
+            self.hash.as_ref() == Some(&other.hash())
+        })
+    }
+}
+
 /// One entry of [`Store::history`](crate::store::Store::history).
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RevisionSummary {
     /// Its number, from 1.
     pub revision: u32,
@@ -59,7 +102,7 @@ pub struct RevisionSummary {
 }
 
 /// One entry of [`Store::list`](crate::store::Store::list).
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
     /// Short name.
     pub slug: Slug,

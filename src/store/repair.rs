@@ -16,6 +16,9 @@ use crate::material::{Activity, Input, Material, Slug};
 /// Fits of a revision with values in `fit.model` that are tried one by one; further ones are tried together.
 const MOST_TRIED_APART: usize = 10;
 
+/// The command that is recorded with what a repair writes.
+const COMMAND: &str = "check --repair";
+
 /// Result of [`Store::repair`], a sentence each.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Repair {
@@ -70,6 +73,7 @@ fn repair(conn: &mut Connection, row_check: &mut RowCheck, at_hand: &[Material])
     }
     for slug in &slugs {
         repair.attempt(&tx, slug.as_str(), || revisions(&tx, row_check, slug, &at_hand))?;
+        repair.attempt(&tx, slug.as_str(), || records(&tx, slug))?;
         repair.attempt(&tx, slug.as_str(), || latest_revision(&tx, slug))?;
         repair.attempt(&tx, slug.as_str(), || lost_current_revision(&tx, slug))?;
     }
@@ -185,6 +189,42 @@ fn renamed_material(tx: &Transaction, renamed: &LostMaterial) -> Result<Vec<Stri
     Ok(Vec::new())
 }
 
+/// Records the repair in revisions with their stored content and another record.
+fn records(tx: &Transaction, slug: &Slug) -> Result<Vec<String>> {
+    let sql = "SELECT revision.id, number, content_hash FROM revision
+               JOIN material ON material.id = material_id WHERE slug = ?1 ORDER BY number";
+    let found: Vec<(i64, u32, String)> =
+        rows(tx, sql, [slug.as_str()], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
+    let most = found.last().map_or(0, |(_, number, _)| *number);
+    let mut mended = Vec::new();
+    for (id, number, content_hash) in found {
+        let stored = read::get_in(tx, slug, Some(number)).ok().flatten();
+        let Some(StoredRevision { material, .. }) = stored.filter(is_as_stored) else { continue };
+        if write::has_its_record(tx, id) {
+            continue;
+        }
+        let found = read::recorded(tx, id)?;
+        if found.is_renumbered(most) {
+            return Err(read::damaged(format!(
+                "revision {number} was stored under another number"
+            )));
+        }
+        let by = Activity {
+            command: COMMAND.to_owned(),
+            inputs: vec![Input { name: format!("{slug}@{number}"), hash: content_hash }],
+            origin: found.record.activity.and_then(|activity| activity.origin),
+        };
+        write::replace_activity(tx, id, Some(&by))?;
+        // A revision with a command has statistics.
+        write::rewrite(tx, id, &material)?;
+        mended.push(format!(
+            "`{slug}` had another date, program, command or origin of its revision {number} than was stored; the command \
+             is now `{COMMAND}`, and the rest stays as it is"
+        ));
+    }
+    Ok(mended)
+}
+
 /// Makes the latest revision of a material the current one.
 fn latest_revision(tx: &Transaction, slug: &Slug) -> Result<Vec<String>> {
     let sql = "UPDATE material SET current_revision =
@@ -272,7 +312,7 @@ fn lost_current_revision(tx: &Transaction, slug: &Slug) -> Result<Vec<String>> {
         if let Some(StoredRevision { material, activity, content_hash, .. }) = sound {
             let repeated = Input { name: format!("{slug}@{number}"), hash: content_hash };
             let by = Activity {
-                command: "check --repair".to_owned(),
+                command: COMMAND.to_owned(),
                 inputs: vec![repeated],
                 // Whoever answers for the content answers for its repetition.
                 origin: activity.and_then(|activity| activity.origin),

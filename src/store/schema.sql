@@ -31,7 +31,7 @@ CREATE TABLE revision (
     CHECK (status IN ('active', 'superseded', 'withdrawn')), status_reason TEXT
     CHECK ((status_reason IS NULL) = (status = 'active')), superseded_by TEXT
     CHECK ((superseded_by IS NOT NULL) = (status = 'superseded')), finish TEXT, unknown TEXT NOT NULL DEFAULT '[]'
-    CHECK (json_type(unknown) = 'array'),
+    CHECK (json_type(unknown) = 'array'), record_hash TEXT CHECK (length(record_hash) = 64),
     UNIQUE (material_id, number)
 ) STRICT;
 

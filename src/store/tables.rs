@@ -217,7 +217,7 @@ pub(super) fn quoted(name: &str) -> String {
 }
 
 /// Tables that record who made a revision, which does not follow from its content.
-const MAKING: [&str; 4] = ["activity", "activity_input", "origin", "origin_author"];
+pub(super) const MAKING: [&str; 4] = ["activity", "activity_input", "origin", "origin_author"];
 
 /// Whether the revision must have statistics: older programs did not write them.
 pub(super) fn has_statistics(conn: &Connection, revision_id: i64) -> Result<bool> {

@@ -13,7 +13,7 @@ use super::error::is_damage;
 use super::find::outline::{self, OutlineEntry};
 use super::record::{Addition, Removal};
 use super::rows::rows;
-use super::tables::{follows_from_content, has_statistics, tables};
+use super::tables::{MAKING, follows_from_content, has_statistics, tables};
 use super::{law, read};
 use crate::formats::EffectEntry;
 use crate::material::{Activity, Covariance, Curve, Fit, Illumination, Material, Slug};
@@ -41,7 +41,7 @@ impl<'a> MaterialWriter<'a> {
 
     /// Adds a material, or a revision of it, with its activity, and reads it back.
     /// Does not add the content of the current revision again. Rewrites its rows where they are damaged: the stored
-    /// hash shows that they had this content.
+    /// hash shows that they had this content. A damaged record gets this activity.
     pub fn add(&mut self, material: &Material, activity: Option<&Activity>) -> Result<Addition> {
         let tx = self.tx;
         let content_hash = material.content_hash();
@@ -50,8 +50,11 @@ impl<'a> MaterialWriter<'a> {
                 return Ok(Addition::Unchanged(current.number));
             }
             Some(Current { material_id, number, content_hash: Some((revision_id, stored)) })
-                if stored == content_hash =>
+                if stored == content_hash && !is_renumbered(tx, revision_id, number) =>
             {
+                if !has_its_record(tx, revision_id) {
+                    replace_activity(tx, revision_id, activity)?;
+                }
                 rewrite(tx, revision_id, material)?;
                 (Addition::Repaired(number), material_id)
             }
@@ -143,6 +146,26 @@ fn bring_to_one_value(tx: &Transaction, revision_id: i64) -> Result<()> {
     fits.iter().try_for_each(|fit| Rows { tx, revision_id }.numbers(fit))
 }
 
+/// Computes the hashes of records that an older program did not store. A damaged record gets none.
+pub(super) fn fill_records(tx: &Transaction, torn: &[i64]) -> Result<()> {
+    let sql = "SELECT id FROM revision WHERE record_hash IS NULL";
+    let revisions: Vec<i64> = rows(tx, sql, [], |row| row.get(0))?;
+    for revision_id in revisions.into_iter().filter(|id| !torn.contains(id)) {
+        match write_record_hash(tx, revision_id) {
+            Err(error) if !is_damage(&error) => return Err(error),
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// Stores the hash of the record that a revision has.
+fn write_record_hash(tx: &Transaction, revision_id: i64) -> Result<()> {
+    let hash = read::recorded(tx, revision_id)?.record.hash();
+    let sql = "UPDATE revision SET record_hash = ?2 WHERE id = ?1";
+    tx.prepare_cached(sql)?.execute(params![revision_id, hash]).map(|_| ())
+}
+
 /// Removes materials with all their rows, all or none.
 pub(super) fn remove(conn: &mut Connection, slugs: &[&Slug]) -> Result<Vec<Option<Removal>>> {
     let tx = conn.transaction()?;
@@ -199,8 +222,33 @@ fn current(tx: &Transaction, slug: &Slug) -> Result<Option<Current>> {
 
 /// Whether the current revision has the content of a material, and its hash.
 fn is_intact(tx: &Transaction, material: &Material, current: &Current, hash: &str) -> bool {
-    current.content_hash.as_ref().is_some_and(|(_, stored)| stored == hash)
-        && read_back(tx, material, hash).is_ok()
+    current.content_hash.as_ref().is_some_and(|(id, stored)| {
+        stored == hash && has_its_record(tx, *id) && read_back(tx, material, hash).is_ok()
+    })
+}
+
+/// Whether the record of a revision is as it was stored.
+pub(super) fn has_its_record(tx: &Transaction, revision_id: i64) -> bool {
+    read::recorded(tx, revision_id).is_ok_and(|found| found.is_as_stored())
+}
+
+/// Whether a revision was stored under another number, of those up to `most`.
+fn is_renumbered(tx: &Transaction, revision_id: i64, most: u32) -> bool {
+    read::recorded(tx, revision_id).is_ok_and(|found| found.is_renumbered(most))
+}
+
+/// Replaces what is recorded of the making of a revision; its number, date and program stay.
+pub(super) fn replace_activity(
+    tx: &Transaction,
+    revision_id: i64,
+    activity: Option<&Activity>,
+) -> Result<()> {
+    for table in MAKING.iter().rev() {
+        tx.execute(&format!("DELETE FROM {table} WHERE revision_id = ?1"), [revision_id])?;
+    }
+    let rows = Rows { tx, revision_id };
+    activity.map_or(Ok(()), |activity| rows.activity(activity))?;
+    write_record_hash(tx, revision_id)
 }
 
 /// One more than the greatest revision number of a material.
@@ -308,6 +356,7 @@ fn revision(
     let rows = Rows { tx, revision_id };
     rows.material(material)?;
     activity.map_or(Ok(()), |activity| rows.activity(activity))?;
+    write_record_hash(tx, revision_id)?;
     Ok(material_id)
 }
 

@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use rusqlite::{Connection, Error, Result, Row, params, params_from_iter};
+use rusqlite::{Connection, Result, Row, params, params_from_iter};
 
 use super::filter::{self, Filter};
 use crate::brdf::{Brdf, Outline};
 use crate::material::{Lobes, Slug};
 use crate::radar::Footprint;
 use crate::store::database::Store;
-use crate::store::error::{InFile, StoreError};
+use crate::store::error::{InFile, StoreError, is_damage};
 use crate::store::read::{Rendered, rendered_in};
 use crate::store::rows::rows;
 
@@ -108,22 +108,31 @@ fn model_hash(model: &Brdf) -> Option<[u8; 16]> {
 
 /// Writes the outlines of all materials, for a file from an older program.
 pub(crate) fn fill(conn: &Connection) -> Result<()> {
-    each(conn, |line| write(conn, &line))
+    each(conn, |line| write(conn, &line)).map(|_| ())
 }
 
-/// Materials with another outline than that of their rendered model.
-pub(super) fn stale(conn: &Connection) -> Result<Vec<String>> {
+/// Outlines that are not those of what is stored.
+pub(super) struct Stale {
+    /// Materials with another outline than that of their rendered model.
+    pub changed: Vec<String>,
+    /// Materials whose rendered model cannot be read.
+    pub unreadable: Vec<Slug>,
+}
+
+/// Compares the outlines with the rendered models.
+pub(super) fn stale(conn: &Connection) -> Result<Stale> {
     let mut kept: BTreeMap<String, OutlineEntry> =
         all(conn, &Filter::default())?.into_iter().map(|line| (line.slug.clone(), line)).collect();
-    let mut stale = Vec::new();
-    each(conn, |line| {
+    let mut changed = Vec::new();
+    let unreadable = each(conn, |line| {
         if !kept.remove(&line.slug).is_some_and(|kept| is_same(&kept, &line)) {
-            stale.push(line.slug);
+            changed.push(line.slug);
         }
         Ok(())
     })?;
-    stale.extend(kept.into_keys());
-    Ok(stale)
+    kept.retain(|slug, _| !unreadable.iter().any(|other| other.as_str() == slug));
+    changed.extend(kept.into_keys());
+    Ok(Stale { changed, unreadable })
 }
 
 fn is_same(kept: &OutlineEntry, made: &OutlineEntry) -> bool {
@@ -136,18 +145,19 @@ fn is_same(kept: &OutlineEntry, made: &OutlineEntry) -> bool {
         && (kept.footprint, kept.lobes) == (made.footprint, made.lobes)
 }
 
-/// Gives `take` the outline that each material should have.
-fn each(conn: &Connection, mut take: impl FnMut(OutlineEntry) -> Result<()>) -> Result<()> {
+/// Gives `take` the outline that each material should have. Returns the materials that cannot be read: they must not
+/// make the whole file unreadable.
+fn each(conn: &Connection, mut take: impl FnMut(OutlineEntry) -> Result<()>) -> Result<Vec<Slug>> {
     let slugs: Vec<Slug> = rows(conn, "SELECT slug FROM material", [], |row| row.get(0))?;
+    let mut unreadable = Vec::new();
     for slug in slugs {
-        let found = match rendered_in(conn, &slug) {
-            // An unreadable material has no outline and must not make the whole file unreadable.
-            Err(Error::FromSqlConversionFailure(..)) => None,
-            found => found?,
-        };
-        if let Some(rendered) = found {
-            take(line(&slug, &rendered))?;
+        match rendered_in(conn, &slug) {
+            Err(error) if is_damage(&error) => unreadable.push(slug),
+            found => match found? {
+                Some(rendered) => take(line(&slug, &rendered))?,
+                None => unreadable.push(slug),
+            },
         }
     }
-    Ok(())
+    Ok(unreadable)
 }
