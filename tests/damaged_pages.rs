@@ -1255,7 +1255,8 @@ fn wrong_repair(lab: &Laboratory, at: &Path, repair: &Answer, expected: &[Answer
         let is_list = !NAMES.iter().any(|name| command.contains(name));
         let is_changed =
             ["has lost its revision", "than was stored"].iter().any(|words| said.contains(words));
-        if !is_named && !(is_changed && is_list) && !got.is_same(expected) {
+        let is_said = is_named || is_changed && is_list;
+        if !is_said && !got.is_same(expected) {
             wrong.push(format!(
                 "is done, and `{command}` then says something else: {}{}",
                 got.stderr,

@@ -73,12 +73,15 @@ impl Laboratory {
         let mut store = Store::in_memory().expect("a database in memory");
         let material = complete();
         store.add([&material]).expect("a sound material");
-        let path = folder.path().join("matdb.sqlite");
-        store.copy_to(&path).expect("a copy");
-        // Files of a corpus must not depend on the hour.
-        let conn = Connection::open(&path).expect("a database");
+        let (made, path) = (folder.path().join("made.sqlite"), folder.path().join("matdb.sqlite"));
+        store.copy_to(&made).expect("a copy");
+        // Files of a corpus must not depend on the hour. What is added again keeps its date.
+        let conn = Connection::open(&made).expect("a database");
         conn.execute("UPDATE revision SET added_at = '2026-03-14T10:00:00Z'", []).expect("a date");
         drop(conn);
+        let mut store = Store::open(&made).expect("a database");
+        store.add([&material]).expect("the same material");
+        store.copy_to(&path).expect("a copy");
         let store = Store::open_frozen(&path).expect("a database").expect("a database with tables");
         let site = folder.path().join("site");
         publish(&store, &About::default(), &site, |_| ()).expect("a publication");

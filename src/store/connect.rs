@@ -11,9 +11,9 @@ use rusqlite::functions::FunctionFlags;
 use rusqlite::{Connection, ErrorCode, OpenFlags, Transaction, TransactionBehavior};
 use rusqlite_migration::{M, Migrations};
 
-use super::damage::check_pages;
 use super::error::{InFile, StoreError};
 use super::find::outline;
+use super::pages::check_pages;
 use super::rows::rows;
 use super::{law, write};
 use crate::files::folder_of;

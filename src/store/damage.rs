@@ -4,7 +4,7 @@ use rusqlite::{Connection, Result};
 
 use super::error::{is_damage, reason};
 use super::find::stale::{problem, stale};
-use super::read::{damaged, not_latest};
+use super::read::not_latest;
 use super::rows::rows;
 
 /// Every problem of a file as a sentence: damaged pages, references to missing rows, current revisions that are not the
@@ -43,34 +43,4 @@ pub(super) fn damage(conn: &Connection) -> Result<Vec<String>> {
     })?;
     problems.extend(stale(conn)?.iter().map(|slug| problem(slug)));
     Ok(problems)
-}
-
-/// Largest database that is looked at, bytes. The look takes as long as reading every row.
-const MOST_LOOKED_AT_BYTES: i64 = 8 << 20;
-
-/// Whether a database is looked at before it is used.
-pub(super) fn is_small(conn: &Connection) -> Result<bool> {
-    let sql = "SELECT page_count * page_size FROM pragma_page_count, pragma_page_size";
-    conn.query_row(sql, [], |row| row.get::<_, i64>(0)).map(|bytes| bytes <= MOST_LOOKED_AT_BYTES)
-}
-
-/// Fails where pages of a database contradict each other, such as cells that overlap: whoever writes one of them would
-/// damage what is stored beside. Databases above 8 MiB are not looked at.
-pub(super) fn check_pages(conn: &Connection) -> Result<()> {
-    if !is_small(conn)? {
-        return Ok(());
-    }
-    let found = rows(conn, "PRAGMA quick_check", [], |row| row.get::<_, String>(0))?;
-    // Values that contradict their column leave the pages sound, and the material can still be replaced or removed.
-    let of_pages = found.iter().flat_map(|row| row.lines()).find(|line| {
-        ["Tree ", "Page ", "Freelist", "Fragmentation", "Outstanding", "Main freelist"]
-            .iter()
-            .any(|begin| line.starts_with(begin))
-            || line.contains(" never used")
-            || line.contains("reference to page")
-    });
-    match of_pages {
-        None => Ok(()),
-        Some(line) => Err(damaged(line.to_owned())),
-    }
 }

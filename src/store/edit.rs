@@ -1,8 +1,8 @@
 //! Adding and removing materials.
 
-use super::damage::check_pages;
 use super::database::Store;
 use super::error::{InFile, StoreError};
+use super::pages::check_pages;
 use super::record::{Addition, Removal};
 use super::write;
 use crate::material::{Activity, Material, Slug};

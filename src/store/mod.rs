@@ -25,6 +25,7 @@ mod find;
 mod law;
 mod open;
 mod own_schema;
+mod pages;
 mod query;
 mod read;
 mod record;

@@ -8,9 +8,9 @@ use rusqlite::{
 };
 use serde::Serialize;
 
-use super::damage::check_pages;
 use super::error::is_damage;
 use super::find::outline::{self, OutlineEntry};
+use super::pages::check_pages;
 use super::record::{Addition, Removal};
 use super::rows::rows;
 use super::tables::{MAKING, follows_from_content, has_statistics, tables};

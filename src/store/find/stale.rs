@@ -5,9 +5,9 @@ use rusqlite::{Connection, Result};
 use super::filter::Filter;
 use super::outline;
 use crate::material::Slug;
-use crate::store::damage::is_small;
 use crate::store::database::Store;
 use crate::store::error::{InFile, StoreError, is_damage};
+use crate::store::pages::is_small;
 use crate::store::read::damaged;
 use crate::store::rows::rows;
 
