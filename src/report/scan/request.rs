@@ -10,7 +10,7 @@ use crate::formats::exr::Packing;
 use crate::geometry::Raster;
 use crate::render::RenderError;
 use crate::report::json::json_file;
-use crate::setup::ReadyScene;
+use crate::setup::{ReadyScene, View};
 use crate::trace::{Gpu, GpuError, Tracer};
 
 /// A scene to be rendered, and what its files hold.
@@ -52,8 +52,12 @@ pub enum RenderProgress {
     Chirps(usize),
 }
 
-/// The files of a rendering and what they record.
+/// The files of a rendering, what they record, and what they were made of.
 pub struct RenderFiles<'a> {
+    /// What each antenna received, the radar first, then the same of the cross-polar channel.
+    pub views: Vec<View<'a>>,
+    /// The image of each view.
+    pub images: Vec<Raster>,
     /// What `scan.json` holds.
     pub record: ScanRecord<'a>,
     /// Names and bytes: `power.exr`, `power.png` and `cloud.ply` of every antenna, `scan.json`, and the beat signals
@@ -102,11 +106,11 @@ impl<'a> RenderRequest<'a> {
         let footprints = assembly.trace(&setup, &done)?;
 
         progress(RenderProgress::Begin(RenderStage::Power));
-        let views = assembly.views(&setup, &footprints, &done)?;
+        let mut views = assembly.views(&setup, &footprints, &done)?;
         let crossed = assembly.cross_polar_views(&setup, &footprints, &done)?;
 
         progress(RenderProgress::Begin(RenderStage::Image));
-        let images: Vec<Raster> = views.iter().map(|view| ready.image(&view.scan)).collect();
+        let mut images: Vec<Raster> = views.iter().map(|view| ready.image(&view.scan)).collect();
 
         progress(RenderProgress::Begin(RenderStage::Encode));
         let validity = ready.validity(&setup, &footprints);
@@ -114,14 +118,17 @@ impl<'a> RenderRequest<'a> {
             ScanRecord::new(ready, assembly.model(), &views, &crossed, &images, validity, all_hits);
         record.rays_ended = footprints.ended;
         let mut files = encode(all_hits, self.packing, ready, &views, &images, &record)?;
-        let images: Vec<Raster> = crossed.iter().map(|view| ready.image(&view.scan)).collect();
-        files.extend(encode(all_hits, self.packing, ready, &crossed, &images, &record)?);
+        let crossed_images: Vec<Raster> =
+            crossed.iter().map(|view| ready.image(&view.scan)).collect();
+        files.extend(encode(all_hits, self.packing, ready, &crossed, &crossed_images, &record)?);
         files.push(("scan.json".to_owned(), json_file(&record)?));
         if let Some(shape) = self.beat {
             for view in &views {
                 files.push(shape.encode(ready, &setup, &footprints, view)?);
             }
         }
-        Ok(RenderFiles { record, files })
+        views.extend(crossed);
+        images.extend(crossed_images);
+        Ok(RenderFiles { views, images, record, files })
     }
 }

@@ -1,0 +1,53 @@
+"""Materials and renderings for 300 GHz imaging radar.
+
+>>> import matdb as md
+>>> scan = md.render(md.load_scene("builtin:calibration-plate"))
+>>> scan.power_dbm.shape == scan.range_m.shape
+True
+"""
+
+import sys
+
+from ._matdb import (
+    Database,
+    Error,
+    FileError,
+    Material,
+    MaterialError,
+    RenderError,
+    Scan,
+    Scene,
+    SceneError,
+    StoreError,
+    UsageError,
+    View,
+    __version__,
+    load_scene,
+    open,
+    render,
+)
+from ._matdb import _run
+
+__all__ = [
+    "Database",
+    "Error",
+    "FileError",
+    "Material",
+    "MaterialError",
+    "RenderError",
+    "Scan",
+    "Scene",
+    "SceneError",
+    "StoreError",
+    "UsageError",
+    "View",
+    "__version__",
+    "load_scene",
+    "open",
+    "render",
+]
+
+
+def _main() -> int:
+    """The command line."""
+    return _run(["matdb", *sys.argv[1:]])

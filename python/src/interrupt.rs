@@ -1,0 +1,67 @@
+//! Long work without the interpreter's lock, which Ctrl-C ends.
+
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::thread;
+use std::time::Duration;
+
+use pyo3::prelude::*;
+
+/// How long a signal may wait.
+const PATIENCE: Duration = Duration::from_millis(50);
+
+/// Set when the work is to end.
+pub(crate) struct Stop(AtomicBool);
+
+/// What unwinds the threads of work that was stopped.
+struct Stopped;
+
+impl Stop {
+    /// Ends the work that calls this if it was stopped. Long work calls it from its reports of progress, on any thread.
+    pub(crate) fn check(&self) {
+        if self.0.load(Ordering::Relaxed) {
+            // Without the hook of panics, which would print a message.
+            resume_unwind(Box::new(Stopped));
+        }
+    }
+}
+
+/// Does work on another thread while this one looks for signals.
+pub(crate) fn interruptible<T: Send>(
+    py: Python<'_>,
+    work: impl FnOnce(&Stop) -> T + Send,
+) -> PyResult<T> {
+    let stop = Stop(AtomicBool::new(false));
+    let mut signal = None;
+    let done = py.detach(|| {
+        thread::scope(|scope| {
+            let (sender, receiver) = channel();
+            let stop = &stop;
+            scope.spawn(move || {
+                // Nothing of the work is used after it has ended early.
+                let done = catch_unwind(AssertUnwindSafe(|| work(stop)));
+                let _ = sender.send(done);
+            });
+            loop {
+                match receiver.recv_timeout(PATIENCE) {
+                    Ok(done) => return done,
+                    Err(RecvTimeoutError::Disconnected) => return Err(Box::new(Stopped) as _),
+                    Err(RecvTimeoutError::Timeout) => {
+                        if let Err(raised) = Python::attach(|py| py.check_signals()) {
+                            stop.0.store(true, Ordering::Relaxed);
+                            signal = Some(raised);
+                        }
+                    }
+                }
+            }
+        })
+    });
+    match (done, signal) {
+        (Err(payload), Some(raised)) if payload.is::<Stopped>() => Err(raised),
+        (Err(payload), _) => resume_unwind(payload),
+        // The signal came too late to stop the work, and must not be lost.
+        (Ok(_), Some(raised)) => Err(raised),
+        (Ok(done), None) => Ok(done),
+    }
+}

@@ -1,0 +1,39 @@
+//! The Python module of matdb: bindings only, each function one call of the library. Inside are SI units; what Python
+//! sees says its unit in its name.
+
+#![warn(missing_docs)]
+
+mod command;
+mod database;
+mod error;
+mod interrupt;
+mod json;
+mod material;
+mod scan;
+mod scene;
+
+/// The extension module, which `matdb/__init__.py` shows to users.
+#[pyo3::pymodule(gil_used = false)]
+mod _matdb {
+    use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use crate::command::_run;
+    #[pymodule_export]
+    use crate::database::{Database, open};
+    #[pymodule_export]
+    use crate::error::{
+        Error, FileError, MaterialError, RenderError, SceneError, StoreError, UsageError,
+    };
+    #[pymodule_export]
+    use crate::material::Material;
+    #[pymodule_export]
+    use crate::scan::{Scan, View, render};
+    #[pymodule_export]
+    use crate::scene::{Scene, load_scene};
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

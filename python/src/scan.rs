@@ -1,0 +1,336 @@
+//! A rendering, as arrays and as files.
+
+use std::path::PathBuf;
+
+use matdb::files::write_all;
+use matdb::formats::ply::{Column, Scalar};
+use matdb::geometry::Raster;
+use matdb::render::{Echo, cloud_table};
+use matdb::report::{RenderFiles, RenderRequest};
+use matdb::setup::{ReadyScene, View as Received};
+use numpy::{PyArray1, PyArrayMethods};
+use pyo3::exceptions::PyKeyError;
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+
+use crate::database::Database;
+use crate::error::raised;
+use crate::interrupt::interruptible;
+use crate::scene::Scene;
+
+/// What one antenna received in one polarisation.
+#[pyclass(frozen, module = "matdb")]
+pub(crate) struct View {
+    /// Channels of the image by their names.
+    image: Py<PyDict>,
+    /// Columns of the cloud by their names.
+    cloud: Py<PyDict>,
+    x_m: Py<PyArray1<f64>>,
+    y_m: Py<PyArray1<f64>>,
+    threshold_w: f64,
+}
+
+/// A rendering of a scene.
+#[pyclass(frozen, module = "matdb")]
+pub(crate) struct Scan {
+    name: String,
+    files: Vec<(String, Vec<u8>)>,
+    /// The radar's own view first.
+    views: Vec<(String, Py<View>)>,
+    chirps: usize,
+    notices: Vec<String>,
+}
+
+/// Renders a scene on all cores. Ctrl-C ends it.
+///
+/// Parameters
+/// ----------
+/// scene : Scene
+/// db : Database, optional
+///     Where its materials are looked for; without it, and for those that it does not have, the built-in ones.
+/// seed : int, optional
+///     In the place of the scene's own.
+///
+/// Returns
+/// -------
+/// Scan
+#[pyfunction]
+#[pyo3(signature = (scene, *, db = None, seed = None))]
+pub(crate) fn render(
+    py: Python<'_>,
+    scene: &Bound<'_, Scene>,
+    db: Option<&Database>,
+    seed: Option<u64>,
+) -> PyResult<Scan> {
+    let with_seed = seed
+        .map(|seed| {
+            let changes = PyDict::new(py);
+            changes.set_item("seed", seed)?;
+            scene.get().with(py, &changes)
+        })
+        .transpose()?;
+    let scene = with_seed.as_ref().unwrap_or_else(|| scene.get());
+    let store = db.map_or(Ok(None), Database::store)?;
+    let ready =
+        ReadyScene::new(scene.scene.clone(), &scene.path, store.as_ref()).map_err(raised)?;
+    drop(store);
+    let request = RenderRequest::new(&ready);
+    let rendered = interruptible(py, |stop| request.render(&|_| stop.check()))?;
+    Scan::new(py, &ready, rendered.map_err(raised)?)
+}
+
+impl Scan {
+    fn new(py: Python<'_>, ready: &ReadyScene, rendered: RenderFiles<'_>) -> PyResult<Scan> {
+        let mut views = Vec::new();
+        for (view, image) in std::iter::zip(&rendered.views, rendered.images) {
+            let name = view.file_name("view", "");
+            let name = name.trim_end_matches('.').replacen("view", "radar", 1);
+            views.push((name, Py::new(py, View::new(py, ready, view, image)?)?));
+        }
+        Ok(Scan {
+            name: ready.scene.file.name.clone(),
+            files: rendered.files,
+            views,
+            chirps: ready.scene.chirps.rays.len(),
+            notices: ready.notices(),
+        })
+    }
+
+    fn radar<'a, 'py>(&'a self, py: Python<'py>) -> PyResult<&'a Bound<'py, View>> {
+        let (_, view) = self.views.first().ok_or_else(|| PyKeyError::new_err("no view"))?;
+        Ok(view.bind(py))
+    }
+}
+
+impl View {
+    fn new(
+        py: Python<'_>,
+        ready: &ReadyScene,
+        view: &Received<'_>,
+        raster: Raster,
+    ) -> PyResult<View> {
+        let regions: Vec<&str> =
+            ready.scene.target.regions.iter().map(|region| region.name.as_str()).collect();
+        let materials: Vec<&str> =
+            ready.materials.iter().map(|material| material.name.as_str()).collect();
+        let detections: Vec<&Echo> = view.scan.detections().collect();
+        let table = cloud_table(&detections, &ready.material_of_region, &regions, &materials, true);
+        let cloud = PyDict::new(py);
+        for column in table.columns {
+            let name = column.name.clone();
+            cloud.set_item(name, frozen(&array(py, column)?)?)?;
+        }
+        let [x_m, y_m] = [
+            (0..raster.width).map(|column| raster.x_m(column)).collect::<Vec<_>>(),
+            (0..raster.height).map(|row| raster.y_m(row)).collect(),
+        ]
+        .map(|values| PyArray1::from_vec(py, values));
+        let image = PyDict::new(py);
+        let shape = [raster.height, raster.width];
+        for channel in raster.channels {
+            let values = PyArray1::from_vec(py, channel.values).reshape(shape)?;
+            image.set_item(channel.name, frozen(&values)?)?;
+        }
+        frozen(&x_m)?;
+        frozen(&y_m)?;
+        Ok(View {
+            image: image.unbind(),
+            cloud: cloud.unbind(),
+            x_m: x_m.unbind(),
+            y_m: y_m.unbind(),
+            threshold_w: view.scan.threshold_w,
+        })
+    }
+
+    fn channel<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        self.image.bind(py).as_any().get_item(name)
+    }
+
+    fn column<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        self.cloud.bind(py).as_any().get_item(name)
+    }
+}
+
+/// An array that nobody may write: it is shared.
+fn frozen<'a, 'py, T>(array: &'a Bound<'py, T>) -> PyResult<&'a Bound<'py, T>> {
+    array.as_any().call_method1("setflags", (false,))?;
+    Ok(array)
+}
+
+/// A column with the type that the cloud's file has.
+fn array<'py>(py: Python<'py>, column: Column) -> PyResult<Bound<'py, PyAny>> {
+    let values = column.values;
+    Ok(match column.scalar {
+        Scalar::Double => PyArray1::from_vec(py, values).into_any(),
+        Scalar::Float => {
+            PyArray1::from_iter(py, values.iter().map(|value| *value as f32)).into_any()
+        }
+        _ => PyArray1::from_iter(py, values.iter().map(|value| *value as i64)).into_any(),
+    })
+}
+
+#[pymethods]
+impl View {
+    /// The image's channels by name: float32 arrays (rows, columns), NaN where nothing was detected.
+    #[getter]
+    fn image<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        self.image.bind(py).copy()
+    }
+
+    /// Received power, dBm: float32 (rows, columns), row 0 at the top, NaN where nothing was detected.
+    #[getter]
+    fn power_dbm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.channel(py, "power_dbm")
+    }
+
+    /// Range, m, as `power_dbm`.
+    #[getter]
+    fn range_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.channel(py, "range_m")
+    }
+
+    /// Places of the image's columns, x of the target plane, m.
+    #[getter]
+    fn x_m<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.x_m.bind(py).clone()
+    }
+
+    /// Places of the image's rows, y of the target plane, m; row 0 is the largest.
+    #[getter]
+    fn y_m<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.y_m.bind(py).clone()
+    }
+
+    /// The detections: a column each of the measured values and of what truly caused them, by name with unit.
+    /// `pandas.DataFrame(cloud)` and `polars.DataFrame(cloud)` take it.
+    #[getter]
+    fn cloud<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        self.cloud.bind(py).copy()
+    }
+
+    /// Places of the detections in the global frame, m: float64 (n, 3).
+    #[getter]
+    fn xyz_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let columns = ["x", "y", "z"].map(|name| self.column(py, name));
+        let [x, y, z] = columns;
+        py.import("numpy")?.call_method1("column_stack", ((x?, y?, z?),))
+    }
+
+    /// Received power of the detections, dBm: float32 (n,).
+    #[getter]
+    fn points_dbm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.column(py, "power_dbm")
+    }
+
+    /// Least power that counts as a detection, W.
+    #[getter]
+    fn threshold_w(&self) -> f64 {
+        self.threshold_w
+    }
+
+    fn __len__(&self, py: Python<'_>) -> PyResult<usize> {
+        self.column(py, "x")?.len()
+    }
+}
+
+#[pymethods]
+impl Scan {
+    /// Name of the scene.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What each antenna received, by its name: `radar` is the radar's own, `cross-radar` its cross-polar channel,
+    /// `radar-NAME` a receiver.
+    #[getter]
+    fn views<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let views = PyDict::new(py);
+        for (name, view) in &self.views {
+            views.set_item(name, view)?;
+        }
+        Ok(views)
+    }
+
+    /// Received power, dBm: float32 (rows, columns), row 0 at the top, NaN where nothing was detected.
+    #[getter]
+    fn power_dbm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.radar(py)?.get().power_dbm(py)
+    }
+
+    /// Range, m, as `power_dbm`.
+    #[getter]
+    fn range_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.radar(py)?.get().range_m(py)
+    }
+
+    /// Places of the image's columns, x of the target plane, m.
+    #[getter]
+    fn x_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        Ok(self.radar(py)?.get().x_m(py))
+    }
+
+    /// Places of the image's rows, y of the target plane, m; row 0 is the largest.
+    #[getter]
+    fn y_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        Ok(self.radar(py)?.get().y_m(py))
+    }
+
+    /// The detections of the radar's own view, as `View.cloud`.
+    #[getter]
+    fn cloud<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        self.radar(py)?.get().cloud(py)
+    }
+
+    /// Places of the detections in the global frame, m: float64 (n, 3).
+    #[getter]
+    fn xyz_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.radar(py)?.get().xyz_m(py)
+    }
+
+    /// Received power of the detections, dBm: float32 (n,).
+    #[getter]
+    fn points_dbm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.radar(py)?.get().points_dbm(py)
+    }
+
+    /// What a person should not overlook, a sentence each.
+    #[getter]
+    fn notices(&self) -> Vec<String> {
+        self.notices.clone()
+    }
+
+    /// What was rendered and of what, as `scan.json` has it.
+    #[getter]
+    fn record<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        py.import("json")?.call_method1("loads", (self.file(py, "scan.json")?,))
+    }
+
+    /// Names of its files.
+    #[getter]
+    fn file_names(&self) -> Vec<&str> {
+        self.files.iter().map(|(name, _)| name.as_str()).collect()
+    }
+
+    /// Bytes of one of its files.
+    fn file<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyBytes>> {
+        let found = self.files.iter().find(|(own, _)| own == name);
+        let (_, bytes) = found.ok_or_else(|| PyKeyError::new_err(name.to_owned()))?;
+        Ok(PyBytes::new(py, bytes))
+    }
+
+    /// Writes the files that `matdb render` writes, all or none.
+    fn save(&self, py: Python<'_>, folder: PathBuf) -> PyResult<()> {
+        py.detach(|| write_all(&folder, &self.files)).map_err(raised)
+    }
+
+    /// The picture, for a notebook.
+    fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        self.file(py, "power.png")
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let detections = self.radar(py)?.get().__len__(py)?;
+        Ok(format!("<matdb.Scan {}: {detections} detections of {} chirps>", self.name, self.chirps))
+    }
+}

@@ -1,0 +1,183 @@
+"""The bindings: the bytes of the command line, arrays that fit them, errors, interruption, threads and memory."""
+
+import pickle
+import re
+import resource
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import matdb as md
+
+SCENE = """
+name = "plate"
+seed = 1
+[radar.scan]
+pattern = "raster"
+lines = 12
+chirps_per_line = 12
+width_m = 0.2
+height_m = 0.2
+[radar.speckle]
+looks = 4
+form = "independent"
+[[mesh]]
+name = "plate"
+file = "builtin:plate"
+size_m = [1, 1, 0]
+translation_m = [0, 1.1, 0]
+[[region]]
+name = "all"
+material = "mannequin-paint"
+"""
+COMMAND = "import sys, matdb; sys.exit(matdb._main())"
+
+
+def command(folder, *words):
+    return subprocess.run([sys.executable, "-c", COMMAND, *words], cwd=folder, capture_output=True, text=True)
+
+
+@pytest.fixture
+def scene(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("plate.toml").write_text(SCENE)
+    return md.load_scene("plate.toml")
+
+
+def files(folder):
+    return {path.name: path.read_bytes() for path in Path(folder).iterdir()}
+
+
+def test_the_bytes_are_those_of_the_command_line(scene, tmp_path):
+    said = command(tmp_path, "render", "plate.toml", "-o", "by-command")
+    assert said.returncode == 0, said.stderr
+    scan = md.render(scene)
+    scan.save("by-python")
+    assert files("by-python") == files("by-command")
+    assert sorted(files("by-python")) == sorted(scan.file_names)
+    assert md.render(scene, seed=2).file("cloud.ply") != scan.file("cloud.ply")
+
+
+def test_arrays_are_what_the_files_hold(scene):
+    scan = md.render(scene)
+    assert scan.power_dbm.dtype == np.float32
+    assert scan.power_dbm.shape == (len(scan.y_m), len(scan.x_m)) == scan.range_m.shape
+    assert np.all(np.diff(scan.x_m) > 0) and np.all(np.diff(scan.y_m) < 0)
+    assert scan.xyz_m.shape == (len(scan.points_dbm), 3)
+    detections = scan.record["counts"]["detections"]
+    assert len(scan.points_dbm) == detections > 0
+    assert f"{detections} detections of 144 chirps" in repr(scan)
+    with pytest.raises(ValueError):
+        scan.power_dbm[0, 0] = 0.0
+    with pytest.raises(ValueError):
+        scan.points_dbm[0] = 0.0
+    # What is detected is in the image: the brightest pixel holds no more than the brightest point.
+    assert np.nanmax(scan.power_dbm) <= scan.points_dbm.max() + 1e-4
+    assert scan._repr_png_() == scan.file("power.png")
+
+
+def test_errors_are_the_sentences_of_the_command_line(scene, tmp_path):
+    with pytest.raises(md.SceneError) as refused:
+        md.load_scene("builtin:nothing")
+    said = command(tmp_path, "render", "builtin:nothing", "-o", "out")
+    assert said.returncode == 1
+    assert said.stderr.splitlines()[-1] == f"error: {refused.value}"
+    with pytest.raises(md.SceneError, match="unknown key `nonsense`"):
+        scene.replace(radar__nonsense=1)
+    with pytest.raises(md.UsageError, match="give it whole"):
+        scene.replace(name__of="x")
+    with pytest.raises(TypeError, match="no such value"):
+        scene.replace(seed=None)
+    with pytest.raises(md.MaterialError, match="nothing-such"):
+        md.render(md.Scene.from_text(SCENE.replace("mannequin-paint", "nothing-such"), "plate.toml"))
+    Path("foreign.sqlite").write_text("This is another program's file.")
+    with pytest.raises(md.StoreError):
+        md.open("foreign.sqlite")
+    assert issubclass(md.SceneError, md.Error)
+
+
+def test_a_database_is_a_mapping_of_materials(scene):
+    db = md.open()
+    assert len(db) == 0 and not Path("matdb.sqlite").exists()
+    assert db["cotton"].revision is None
+    assert db.add("cotton", "ptfe") == ["cotton@1", "ptfe@1"]
+    assert list(db) == ["cotton", "ptfe"] and "cotton" in db and "steel" not in db
+    cotton = db["cotton@1"]
+    assert (cotton.name, cotton.revision) == ("cotton", 1)
+    assert cotton.to_dict()["slug"] == "cotton"
+    levels = cotton.sigma0_db(np.array([0, 10, 20]))
+    assert levels.shape == (3,) and np.all(np.isfinite(levels))
+    assert cotton.sigma0_db([10.0]) == levels[1:2]
+    with pytest.raises(KeyError, match="did you mean `cotton`"):
+        db["coton"]
+    assert db.search("cotton")[0]["slug"] == "cotton"
+    assert md.render(scene, db=db).name == "plate"
+
+
+def test_scenes_and_databases_can_be_pickled(scene):
+    other = pickle.loads(pickle.dumps(scene.replace(seed=9)))
+    assert other.to_dict()["seed"] == 9
+    assert md.render(other).file("cloud.ply") == md.render(scene, seed=9).file("cloud.ply")
+    assert pickle.loads(pickle.dumps(md.open("a.sqlite"))).path == Path("a.sqlite")
+
+
+def test_threads_render_the_same(scene):
+    expected = md.render(scene).file("cloud.ply")
+    found = []
+    threads = [threading.Thread(target=lambda: found.append(md.render(scene).file("cloud.ply"))) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert found == [expected] * 4
+
+
+def test_an_interruption_ends_a_long_render(tmp_path):
+    # Thirty million rays.
+    program = """
+import matdb as md
+scene = md.load_scene("builtin:calibration-sphere").replace(
+    radar__scan={"pattern": "raster", "lines": 680, "chirps_per_line": 680, "width_m": 0.3, "height_m": 0.3},
+    spot__rays=64)
+print("begun", flush=True)
+try:
+    md.render(scene)
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+"""
+    running = subprocess.Popen([sys.executable, "-c", program], cwd=tmp_path, stdout=subprocess.PIPE, text=True)
+    assert running.stdout.readline() == "begun\n"
+    time.sleep(0.5)
+    assert running.poll() is None, "the render is too short for this test"
+    running.send_signal(signal.SIGINT)
+    said, _ = running.communicate(timeout=20)
+    assert said == "interrupted\n" and running.returncode == 0
+
+
+def test_memory_does_not_grow(scene):
+    def kilobytes():
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+    for _ in range(50):
+        md.render(scene)
+    before = kilobytes()
+    for _ in range(200):
+        md.render(scene)
+    assert kilobytes() - before < 8_000, "200 renders of 40 kB of files each"
+
+
+def test_the_examples_of_the_pages_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    root = Path(__file__).parent.parent.parent
+    examples = []
+    for page in ["python/README.md", "docs/python.md"]:
+        examples += re.findall(r"```python\n(.*?)```", (root / page).read_text(), re.DOTALL)
+    assert len(examples) == 3
+    for example in examples:
+        exec(example, {})
