@@ -148,7 +148,9 @@ fn bring_to_one_value(tx: &Transaction, revision_id: i64) -> Result<()> {
 
 /// Computes the hashes of records that an older program did not store. A damaged record gets none.
 pub(super) fn fill_records(tx: &Transaction, torn: &[i64]) -> Result<()> {
-    let sql = "SELECT id FROM revision WHERE record_hash IS NULL";
+    // A revision of no material has no record.
+    let sql = "SELECT revision.id FROM revision JOIN material ON material.id = material_id
+               WHERE record_hash IS NULL";
     let revisions: Vec<i64> = rows(tx, sql, [], |row| row.get(0))?;
     for revision_id in revisions.into_iter().filter(|id| !torn.contains(id)) {
         match write_record_hash(tx, revision_id) {
@@ -183,6 +185,10 @@ fn remove_one(tx: &Transaction, slug: &Slug) -> Result<Option<Removal>> {
     let listed = "SELECT material_id FROM entry WHERE slug = ?1";
     let listed = tx.query_row(listed, [slug.as_str()], |row| row.get::<_, i64>(0)).optional()?;
     let Some(material_id) = found.or(listed) else { return Ok(None) };
+    let has_another_name = "SELECT EXISTS (SELECT 1 FROM material NOT INDEXED WHERE id = ?1)";
+    if found.is_none() && tx.query_row(has_another_name, [material_id], |row| row.get(0))? {
+        return Err(read::damaged(format!("the list calls another material `{slug}`")));
+    }
     let count = "SELECT count(*) FROM revision NOT INDEXED WHERE material_id = ?1";
     let revisions = tx.query_row(count, [material_id], |row| row.get(0))?;
     tx.execute("DELETE FROM material WHERE id = ?1", [material_id])?;
@@ -255,7 +261,8 @@ pub(super) fn replace_activity(
 fn next_number(tx: &Transaction, current: &Current) -> Result<u32> {
     let sql = "SELECT coalesce(max(number), 0) FROM revision NOT INDEXED WHERE material_id = ?1";
     let greatest: u32 = tx.query_row(sql, [current.material_id], |row| row.get(0))?;
-    Ok(greatest.max(current.number) + 1)
+    let last = greatest.max(current.number);
+    last.checked_add(1).ok_or_else(|| read::damaged(format!("no number follows revision {last}")))
 }
 
 /// Reads a material back and fails where it differs from what was written.
