@@ -202,7 +202,6 @@ impl View {
     }
 
     /// The detections: a column each of the measured values and of what truly caused them, by name with unit.
-    /// `pandas.DataFrame(cloud)` and `polars.DataFrame(cloud)` take it.
     #[getter]
     fn cloud<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.cloud.bind(py).copy()
