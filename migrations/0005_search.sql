@@ -74,9 +74,15 @@ SELECT material.id AS id, slug, name, class,
 FROM material JOIN revision ON material_id = material.id AND number = current_revision;
 
 INSERT INTO entry SELECT * FROM entry_made;
-INSERT INTO entry_tag SELECT * FROM entry_tag_made;
+-- A material with damaged texts is left out of searches: it must not keep the file from being opened.
+INSERT INTO entry_tag SELECT DISTINCT slug, value
+FROM material JOIN revision ON material_id = material.id AND number = current_revision
+JOIN json_each(CASE WHEN json_valid(tags) THEN tags ELSE '[]' END);
 INSERT INTO search (rowid, slug, name, class, tags, description, finish, unknown, sources)
-SELECT * FROM search_made;
+SELECT * FROM search_made WHERE id IN (
+    SELECT material.id FROM material JOIN revision ON material_id = material.id AND number = current_revision
+    WHERE json_valid(tags) AND json_valid(unknown)
+    AND NOT EXISTS (SELECT 1 FROM source WHERE revision_id = revision.id AND NOT json_valid(authors)));
 
 INSERT INTO unit (column_name, ucum, meaning) VALUES
     ('curves', '1', 'number of curves'),

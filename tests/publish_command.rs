@@ -653,7 +653,7 @@ fn a_publication_of_an_older_schema_is_verified_and_imported() {
             "DROP VIEW v_findings; DROP VIEW v_fits; DROP VIEW v_curves;
              DROP VIEW fit_estimate; DROP TABLE fit_number; {estimates}
              DROP TABLE curve_levels; DROP TABLE curve_illumination; DROP TABLE fit_lobes;
-             ALTER TABLE revision DROP COLUMN record_hash;
+             DROP TABLE record;
              ALTER TABLE outline DROP COLUMN footprint; ALTER TABLE outline DROP COLUMN lobes;
              ALTER TABLE observation DROP COLUMN yt_m; ALTER TABLE observation DROP COLUMN xt_m;
              DELETE FROM unit WHERE column_name LIKE 'held_out%' OR column_name IN ('xt_m', 'yt_m', 'beam_rad', 'relative', 'only_detected');

@@ -415,7 +415,7 @@ fn a_fit_is_called_one_outside_the_site_too() {
     assert_eq!(material.rendered_words().as_ref(), Some(&words));
     let slugs = [material.slug.clone(), "ptfe".parse().unwrap(), "absent".parse().unwrap()];
     let listed = store.rendered_words(&slugs).unwrap();
-    assert_eq!(listed, BTreeMap::from([(material.slug.clone(), words)]));
+    assert_eq!(listed, BTreeMap::from([(material.slug.clone(), Some(words))]));
     publish(&store, &about(), &folder.path().join("site"), |_| ()).unwrap();
     let index = fs::read_to_string(folder.path().join("site/api/v1/index.json")).unwrap();
     let index: serde_json::Value = serde_json::from_str(&index).unwrap();

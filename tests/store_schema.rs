@@ -192,6 +192,101 @@ fn a_damaged_fit_does_not_close_a_file_of_an_older_schema() {
     }
 }
 
+/// Writes over what a row of `revision` of an older file holds, without the rules of its tables.
+fn damaged_revision(path: &Path, sql: &str) {
+    let conn = Connection::open(path).unwrap();
+    let alone = "PRAGMA journal_mode = delete; PRAGMA ignore_check_constraints = on; PRAGMA foreign_keys = off";
+    conn.execute_batch(alone).unwrap();
+    conn.execute_batch(sql).unwrap();
+}
+
+#[test]
+fn a_damaged_revision_does_not_close_a_file_of_an_older_schema() {
+    for (file, sql) in [
+        ("schema-0001.sqlite", "UPDATE revision SET tags = 'gold' WHERE id = 2"),
+        (
+            "schema-0003.sqlite",
+            "UPDATE revision SET description = CAST(x'ff' AS TEXT) WHERE id = 2",
+        ),
+        ("schema-0010.sqlite", "UPDATE revision SET theta_max_rad = 9.0 WHERE id = 2"),
+        ("schema-0014.sqlite", "UPDATE revision SET status = 'activ' WHERE id = 2"),
+        ("schema-0014.sqlite", "UPDATE revision SET tags = '[' WHERE id = 2"),
+        ("schema-0014.sqlite", "UPDATE revision SET unknown = 'nothing' WHERE id = 2"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("matdb.sqlite");
+        fs::copy(fixtures().join(file), &path).unwrap();
+        damaged_revision(&path, sql);
+        let before = fs::read(&path).unwrap();
+        let run = |line: &str| {
+            let output = support::matdb(folder.path()).args(line.split(' ')).output().unwrap();
+            let text = [output.stdout, output.stderr].concat();
+            (output.status.success(), String::from_utf8_lossy(&text).into_owned())
+        };
+        let (is_done, text) = run("list");
+        assert!(is_done && text.contains("primer"), "{file}, {sql}: {text}");
+        assert!(run("show primer").0, "{file}, {sql}");
+        let (is_done, text) = run("show paint");
+        assert!(!is_done && text.contains("check --repair"), "{file}, {sql}: {text}");
+        assert!(fs::read(&path).unwrap() == before, "{file}, {sql}: a reader has written");
+        for command in ["check", "check --repair"] {
+            let (is_sound, text) = run(command);
+            assert!(!is_sound && text.contains("paint"), "{file}, {sql}, {command}: {text}");
+        }
+        // Whoever has the content brings it back.
+        let mut store = Store::open(&path).unwrap();
+        let added = store.add([&held(file)[1]]).unwrap();
+        assert!(matches!(added[0], Addition::Repaired(2)), "{file}, {sql}: {added:?}");
+        drop(store);
+        assert_eq!(contents(&path), held(file));
+    }
+}
+
+#[test]
+fn a_revision_on_a_damaged_page_does_not_close_a_file_of_an_older_schema() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("matdb.sqlite");
+    fs::copy(fixtures().join("schema-0014.sqlite"), &path).unwrap();
+    damaged_revision(
+        &path,
+        "UPDATE revision SET description = printf('%.*c', 4000, 'x') WHERE id = 2;",
+    );
+    let mut bytes = fs::read(&path).unwrap();
+    let text = [b'x'; 900];
+    let place = bytes.windows(text.len()).position(|window| window == text).unwrap();
+    // The first whole page of the text: the page that follows it becomes one that is not there.
+    let page = place.div_ceil(1024) * 1024;
+    bytes[page..page + 4].fill(0xa5);
+    fs::write(&path, bytes).unwrap();
+    for command in ["list", "show primer"] {
+        support::matdb(folder.path()).args(command.split(' ')).assert().success();
+    }
+    let message = support::refused(support::matdb(folder.path()).args(["show", "paint"]));
+    assert!(message.contains("is damaged"), "{message}");
+}
+
+#[test]
+fn of_an_older_file_the_greatest_number_is_not_taken_for_the_latest_revision() {
+    let folder = tempfile::tempdir().unwrap();
+    for sql in [
+        "UPDATE revision SET number = 7 WHERE id = 1",
+        "UPDATE revision SET number = 7 WHERE id = 2",
+    ] {
+        let path = folder.path().join("matdb.sqlite");
+        fs::copy(fixtures().join("schema-0014.sqlite"), &path).unwrap();
+        damaged_revision(&path, sql);
+        let output = support::matdb(folder.path()).args(["check", "--repair"]).output().unwrap();
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert!(!output.status.success() && text.contains("name or number"), "{sql}: {text}");
+        let conn = Connection::open(&path).unwrap();
+        let current = "SELECT current_revision FROM material WHERE slug = 'paint'";
+        let current: i64 = conn.query_row(current, [], |row| row.get(0)).unwrap();
+        assert_eq!(current, 2, "{sql}");
+        support::refused(support::matdb(folder.path()).args(["show", "paint"]));
+        support::matdb(folder.path()).args(["show", "primer"]).assert().success();
+    }
+}
+
 #[test]
 fn what_others_have_made_in_the_way_of_a_newer_schema_is_named() {
     let refers = "CREATE TABLE mine (r, f, p, FOREIGN KEY (r, f, p)

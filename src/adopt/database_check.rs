@@ -12,9 +12,6 @@ use crate::material::{Lobes, builtin};
 use crate::setup::Database;
 use crate::store::{Filter, OutlineEntry, Repair, Store, StoreError};
 
-/// Most copies of a database that repairs leave beside it.
-const MOST_COPIES: u32 = 99;
-
 /// How a database is checked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DatabaseCheck {
@@ -51,8 +48,14 @@ pub struct CheckReport {
     /// What was repaired, a sentence each.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub repaired: Vec<String>,
+    /// A copy of the database as it was before the repair.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub copy: Option<PathBuf>,
     /// What is wrong, and what could not be repaired.
     pub findings: Vec<Problem>,
+    /// How many of the findings are tables, indexes, views and triggers that matdb has not made.
+    #[serde(skip)]
+    pub of_others: usize,
 }
 
 impl DatabaseCheck {
@@ -82,15 +85,13 @@ impl DatabaseCheck {
     ) -> Result<CheckReport, Error> {
         let mut repair = Repair::default();
         if self.repair && database.read()?.is_some() {
-            let mut store = database.write()?;
-            repair = store.repair(&builtin::all()?)?;
-            remove_unreachable(&mut store, &mut repair)?;
+            repair = database.write()?.repair(&builtin::all()?)?;
         }
         let Some(store) = database.read()? else {
             return Err(Error::NoDatabase { path: database.path().to_owned() });
         };
         let file = database.path().display().to_string();
-        let revisions = store.list()?.iter().map(|material| material.revision as usize).sum();
+        let revisions = store.lines()?.iter().map(|material| material.revision as usize).sum();
         progress(CheckProgress::Begin { revisions });
         let mut findings = Vec::new();
         for problem in repair.failed {
@@ -113,7 +114,8 @@ impl DatabaseCheck {
             unread(error);
             Vec::new()
         });
-        let notices = too_much(&store, &outlines, &mut unread);
+        let mut notices = too_much(&store, &outlines, &mut unread);
+        notices.extend(store.lost_revisions().unwrap_or_default());
         let is_of_surface = |line: &&OutlineEntry| line.lobes == Lobes::Surface;
         Ok(CheckReport {
             revisions,
@@ -122,45 +124,11 @@ impl DatabaseCheck {
             surface_lobes: outlines.iter().filter(is_of_surface).count(),
             notices,
             repaired: repair.mended,
+            copy: repair.copy,
+            of_others: store.added_objects().map_or(0, |added| added.len()),
             findings,
         })
     }
-}
-
-/// Removes rows that belong to no material, after a copy of the database was written beside it.
-fn remove_unreachable(store: &mut Store, repair: &mut Repair) -> Result<(), Error> {
-    if store.unreachable_rows()? == 0 {
-        return Ok(());
-    }
-    let name = |number: u32| {
-        let mut name = store.path().as_os_str().to_owned();
-        name.push(if number == 1 {
-            ".before-repair".to_owned()
-        } else {
-            format!(".before-repair-{number}")
-        });
-        PathBuf::from(name)
-    };
-    let is_free = |path: &PathBuf| path.symlink_metadata().is_err();
-    let Some(copy) = (1..=MOST_COPIES).map(name).find(is_free) else {
-        repair.failed.push(format!(
-            "rows of no material stay: {MOST_COPIES} copies of earlier repairs lie beside it"
-        ));
-        return Ok(());
-    };
-    match store.copy_to(&copy) {
-        Ok(()) => {
-            let rows = store.remove_unreachable_rows()?;
-            repair.mended.push(format!(
-                "{rows} rows of lost revisions belonged to no material and were removed; {} has them",
-                copy.display()
-            ));
-        }
-        Err(error) => repair
-            .failed
-            .push(format!("rows of no material stay, since no copy can be written: {error}")),
-    }
-    Ok(())
 }
 
 /// What tells rendered laws apart: the hash of the model, and the bits of its range of angles.

@@ -59,7 +59,7 @@ impl StoreCheck<'_> {
         mut each: impl FnMut(&Summary, &StoredRevision, &mut dyn FnMut(Problem)),
     ) -> CheckCount {
         let mut count = CheckCount::default();
-        let opened = self.check_file(store).and_then(|row_check| Ok((store.list()?, row_check)));
+        let opened = self.check_file(store).and_then(|row_check| Ok((store.lines()?, row_check)));
         let (summaries, mut row_check) = match opened {
             Ok(opened) => opened,
             Err(error) => {

@@ -37,7 +37,9 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         0 => Ok(()),
         count => Err(Error::usage(
             format!("{} wrong in {file}", counted(count, "thing")),
-            if args.repair {
+            if count == report.of_others {
+                "no repair removes what others have made; the lines above say how to"
+            } else if args.repair {
                 "add the damaged materials again, or restore the file from a copy"
             } else {
                 "`matdb check --repair` mends what can be"
@@ -47,8 +49,9 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
 }
 
 fn text(report: &CheckReport, file: &str) -> String {
-    let CheckReport { revisions, curves, fits, surface_lobes, repaired, findings, .. } = report;
+    let CheckReport { revisions, curves, fits, surface_lobes, repaired, copy, findings, .. } = report;
     let mut text: String = repaired.iter().map(|what| format!("{file}: {what}\n")).collect();
+    text.extend(copy.iter().map(|copy| format!("{}: as it was before the repair\n", copy.display())));
     text.extend(findings.iter().map(|wrong| format!("{wrong}\n")));
     text += &format!(
         "looked at {} and {} and made {} again in {file}: {}\n",

@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::material::{Slug, SourceKind};
 use crate::report::{MaterialList, MaterialRow, UnknownWord};
 use crate::setup::Database;
-use crate::store::{DAMAGED, Filter};
+use crate::store::{Filter, Summary};
 
 /// List the materials in the database
 #[derive(Debug, clap::Args)]
@@ -83,16 +83,12 @@ pub(super) fn frequency(text: &str) -> Result<f64, String> {
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let filter = args.filter.filter();
     let store = db.read()?;
+    let most = args.limit.unwrap_or(if console.json { u32::MAX } else { SHOWN });
+    let list = MaterialList::new(&filter, most, store.as_ref())?;
     if console.json {
-        store.as_ref().map_or(Ok(()), |store| store.check_lists(&filter))?;
-        let materials = match (&store, args.limit) {
-            (None, _) => Vec::new(),
-            (Some(store), Some(most)) => store.page(&filter, most)?,
-            (Some(store), None) => store.find(&filter)?,
-        };
-        return console.result("", &materials);
+        let lines: Vec<&Summary> = list.rows.iter().map(|row| &row.summary).collect();
+        return console.result("", &lines);
     }
-    let list = MaterialList::new(&filter, args.limit.unwrap_or(SHOWN), store.as_ref())?;
     let is_any = store.is_none() || filter == Filter::default();
     console.result(&text(&list, is_any, &db.path().display().to_string()), &())
 }
@@ -149,8 +145,8 @@ fn row(MaterialRow { summary: m, kind }: &MaterialRow) -> [String; 8] {
     [
         m.slug.to_string(),
         m.revision.to_string(),
-        // A line that is not what is stored may have any status.
-        if kind == DAMAGED { kind.clone() } else { with_status(kind, &m.status) },
+        // A damaged line may have any kind and status.
+        if m.is_damaged { "damaged".to_owned() } else { with_status(kind, &m.status) },
         m.class.clone(),
         m.curves.to_string(),
         m.observations.to_string(),

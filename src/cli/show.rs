@@ -16,7 +16,7 @@ use crate::setup::Database;
 use crate::setup::{
     MaterialRevision, find_material, later_status_warning, unmet_conditions, unmet_sentence,
 };
-use crate::store::RevisionSummary;
+use crate::store::{RevisionSummary, StoreError};
 use crate::units::{range, shown};
 
 /// Show a material: what is known of it, from whom, and how it scatters
@@ -38,9 +38,13 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         Some(number) => format!("revision {number} in {}", db.path().display()),
         None => format!("built in; `matdb add {}` puts it into a database", material.slug),
     };
-    let history = match &store {
-        Some(store) => store.history(&material.slug)?,
-        None => Vec::new(),
+    let history = match store.map(|store| store.history(&material.slug)) {
+        // This revision is sound.
+        Some(Err(StoreError::Corrupt { problem, .. })) => {
+            console.notice(&format!("its revisions are not listed: {problem}"));
+            Vec::new()
+        }
+        history => history.transpose()?.unwrap_or_default(),
     };
     let mut text = describe(&material, &origin)?;
     if !history.is_empty() {

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use crate::error::Error;
 use crate::material::{Material, Slug};
 use crate::setup::builtin_not_added;
-use crate::store::{DAMAGED, Filter, Store, Summary};
+use crate::store::{Filter, Store, Summary};
 
 /// How many more materials are counted than are shown.
 const MOST_COUNTED: u32 = 10_000;
@@ -61,22 +61,13 @@ impl MaterialList {
             unknown_words: Vec::new(),
         };
         let Some(store) = store else { return Ok(list) };
-        let stale = if *filter == Filter::default() {
-            store.stale_lines()?
-        } else {
-            store.check_lists(filter)?;
-            Vec::new()
-        };
         let page = store.page(filter, most)?;
         let slugs: Vec<Slug> = page.iter().map(|summary| summary.slug.clone()).collect();
         let mut words = store.rendered_words(&slugs)?;
-        for summary in page {
+        for mut summary in page {
             let words = words.remove(&summary.slug);
-            let kind = match words {
-                _ if stale.iter().any(|slug| slug == summary.slug.as_str()) => DAMAGED.to_owned(),
-                Some(words) => words,
-                None => summary.render_kind.as_str().to_owned(),
-            };
+            summary.is_damaged |= words == Some(None);
+            let kind = words.flatten().unwrap_or_else(|| summary.render_kind.as_str().to_owned());
             list.rows.push(MaterialRow { summary, kind });
         }
         if list.rows.is_empty() {

@@ -126,7 +126,6 @@ impl NeighbourSearch {
                 "give a curve with detections below that range",
             ));
         };
-        store.map_or(Ok(()), |store| store.check_outlines(filter))?;
         let probe = probe.lit(self.illumination);
         let built_in = store_of_not_added(store)?;
         let mut report = NeighbourReport {

@@ -38,7 +38,6 @@ impl MaterialSearch<'_> {
             ));
         }
         let store = database.read()?;
-        store.as_ref().map_or(Ok(()), Store::check_texts)?;
         let missing = store_of_not_added(store.as_ref())?;
         let mut hits = Vec::new();
         for (store, origin) in [(store.as_ref(), "database"), (Some(&missing), "built-in")] {

@@ -13,9 +13,10 @@ use rusqlite_migration::{M, Migrations};
 
 use super::error::{InFile, StoreError};
 use super::find::outline;
-use super::pages::check_pages;
+use super::pages::{check_pages, stated_bytes, torn_revisions};
 use super::rows::rows;
-use super::{law, write};
+use super::tables::schema;
+use super::{record, write};
 use crate::files::folder_of;
 
 /// "matd" in the file's header.
@@ -55,7 +56,7 @@ fn schemas(fill: Backlog) -> [M<'static>; LATEST] {
 struct Backlog {
     /// The schema of the file.
     schema: usize,
-    /// Revisions on damaged pages, of which neither fit nor record is read.
+    /// Revisions with rows on damaged pages, which are not read.
     torn: Vec<i64>,
 }
 
@@ -72,13 +73,14 @@ impl Backlog {
         if self.schema < Backlog::OUTLINES {
             outline::fill(tx)?;
         }
-        write::fill_records(tx, &self.torn)
+        write::fill_statistics(tx, &self.torn)?;
+        record::fill(tx, &self.torn)
     }
 }
 
 /// The latest schema in one step, equal to all migrations of an empty file. One step is faster, since SQLite parses
 /// every table again after each change. `cargo test --lib store::connect -- --ignored` writes it.
-const LATEST_SCHEMA: &str = include_str!("schema.sql");
+pub(super) const LATEST_SCHEMA: &str = include_str!("schema.sql");
 
 /// Makes a backup copy the whole database in one step.
 const ALL_PAGES: i32 = -1;
@@ -132,7 +134,9 @@ fn retry_while_busy<T>(open: impl Fn() -> Result<T, StoreError>) -> Result<T, St
 
 fn open_writable(path: &Path) -> Result<Connection, StoreError> {
     // A file of another program is never opened for writing.
-    if size_bytes(path)? > 0 {
+    if size_bytes(path)? == 0 {
+        check_not_lost(path)?;
+    } else {
         match open_unchanged(path) {
             // An interrupted write of matdb. SQLite rolls it back when it opens the file.
             Err(StoreError::Interrupted { .. }) if !names_another_file(path) => {
@@ -158,7 +162,7 @@ fn open_writable(path: &Path) -> Result<Connection, StoreError> {
 
 fn open_readable(path: &Path) -> Result<Option<Connection>, StoreError> {
     if size_bytes(path)? == 0 {
-        return Ok(None);
+        return check_not_lost(path).map(|()| None);
     }
     at_latest_schema(path, open_unchanged(path)?)
 }
@@ -214,6 +218,18 @@ fn in_memory_copy(path: &Path, original: &Connection) -> Result<Connection, Stor
     Ok(copy)
 }
 
+/// Copies a database as it was before the transaction of a writer, page by page, damaged pages too, to a new file.
+pub(super) fn back_up(path: &Path, copy: &Path) -> Result<(), StoreError> {
+    let original = connect(path, OpenFlags::SQLITE_OPEN_READ_WRITE).in_file(path)?;
+    let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE;
+    let mut to = connect(copy, flags).in_file(copy)?;
+    let step = Backup::new(&original, &mut to).and_then(|backup| backup.step(ALL_PAGES));
+    match step.in_file(copy)? {
+        StepResult::Done => Ok(()),
+        _ => Err(StoreError::Busy { file: path.to_owned() }),
+    }
+}
+
 /// Size of the file; 0 when there is none.
 fn size_bytes(path: &Path) -> Result<u64, StoreError> {
     let file = path.to_owned();
@@ -223,6 +239,15 @@ fn size_bytes(path: &Path) -> Result<u64, StoreError> {
         Ok(_) => Err(StoreError::Foreign { file }),
         Err(reason) if reason.kind() == io::ErrorKind::NotFound => Ok(0),
         Err(reason) => Err(StoreError::Open { file, reason }),
+    }
+}
+
+/// Refuses an empty or lost file that has a log: SQLite would take the pages of the log for a database.
+fn check_not_lost(path: &Path) -> Result<(), StoreError> {
+    let log = beside(path, "-wal");
+    match log.symlink_metadata() {
+        Ok(found) if found.len() > 0 => Err(StoreError::Lost { file: path.to_owned(), log }),
+        _ => Ok(()),
     }
 }
 
@@ -249,6 +274,9 @@ fn open_unchanged(path: &Path) -> Result<Connection, StoreError> {
         }
         Err(error) if !log_exists && !journal_exists && needs_log(&error) => {
             open_immutable(path).in_file(path)
+        }
+        Err(error) if log_exists && needs_log(&error) => {
+            Err(StoreError::Log { file: path.to_owned(), log: beside(path, "-wal") })
         }
         result => {
             result.in_file(path)?;
@@ -305,8 +333,7 @@ fn may_add_to(_: &Path) -> bool {
 
 /// Refuses a truncated file. SQLite notices only when it reads a missing page, and fills half a page with zeros.
 fn check_length(path: &Path, conn: &Connection) -> Result<(), StoreError> {
-    let sql = "SELECT page_count * page_size FROM pragma_page_count, pragma_page_size";
-    let said: i64 = conn.query_row(sql, [], |row| row.get(0)).in_file(path)?;
+    let said = stated_bytes(conn).in_file(path)?;
     // New pages may still be in the log alone. The log is looked at first: if there is none, the file has them.
     let has_log = beside(path, "-wal").symlink_metadata().is_ok_and(|found| found.len() > 0);
     let bytes = size_bytes(path)?;
@@ -423,11 +450,16 @@ fn migrate(path: &Path, conn: &mut Connection) -> Result<(), StoreError> {
     if schema_of(path, conn)? == 0 {
         make(path, conn)?;
     }
-    let backlog = Backlog {
-        schema: schema_of(path, conn)?,
-        torn: law::on_damaged_pages(conn).in_file(path)?,
-    };
+    let schema = schema_of(path, conn)?;
+    if schema == LATEST {
+        return Ok(());
+    }
+    let torn = torn_revisions(conn).in_file(path)?;
+    // Some migrations make SQLite check every row of a table. Wrong rows must not close the whole file.
+    conn.pragma_update(None, "ignore_check_constraints", true).in_file(path)?;
+    let backlog = Backlog { schema, torn };
     let outcome = Migrations::new(schemas(backlog).into()).to_latest(conn);
+    conn.pragma_update(None, "ignore_check_constraints", false).in_file(path)?;
     // Another program may have migrated the file while this one waited.
     if schema_of(path, conn)? == LATEST {
         return Ok(());
@@ -456,6 +488,17 @@ fn obstacle(path: &Path, conn: &Connection) -> Result<Option<StoreError>, StoreE
     let has = |objects: &[[String; 2]], wanted: &str| {
         objects.iter().any(|[_, name]| name.eq_ignore_ascii_case(wanted))
     };
+    let ours = schema(&in_memory()?).in_file(path)?;
+    for object in schema(conn).in_file(path)?.into_iter().filter(|object| ours.contains(object)) {
+        let [Some(kind), Some(name), ..] = object else { continue };
+        if !has(&old, &name) {
+            let said = schema_of(path, conn)?;
+            let problem = format!(
+                "it says that it has schema {said}, but its {kind} `{name}` is of a later one"
+            );
+            return Ok(Some(StoreError::BeyondRepair { file: path.to_owned(), problem }));
+        }
+    }
     for [kind, name] in names(conn).in_file(path)?.iter().filter(|[_, name]| !has(&old, name)) {
         let object = format!("the {kind} `{name}`");
         if has(&latest, name) {

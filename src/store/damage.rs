@@ -44,3 +44,14 @@ pub(super) fn damage(conn: &Connection) -> Result<Vec<String>> {
     problems.extend(stale(conn)?.iter().map(|slug| problem(slug)));
     Ok(problems)
 }
+
+/// Materials with fewer revisions than the greatest number says, as a sentence each.
+pub(super) fn lost_revisions(conn: &Connection) -> Result<Vec<String>> {
+    let sql = "SELECT slug, count(*), max(number)
+               FROM material JOIN revision ON material_id = material.id GROUP BY material.id
+               HAVING count(*) < max(number) ORDER BY slug";
+    rows(conn, sql, [], |row| {
+        let (slug, left, latest): (String, u32, u32) = (row.get(0)?, row.get(1)?, row.get(2)?);
+        Ok(format!("of the {latest} revisions of `{slug}`, {left} are left"))
+    })
+}

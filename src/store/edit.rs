@@ -3,7 +3,7 @@
 use super::database::Store;
 use super::error::{InFile, StoreError};
 use super::pages::check_pages;
-use super::record::{Addition, Removal};
+use super::results::{Addition, Removal};
 use super::write;
 use crate::material::{Activity, Material, Slug};
 

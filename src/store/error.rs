@@ -103,6 +103,40 @@ pub enum StoreError {
         /// Name of the trigger.
         name: String,
     },
+    /// The file is empty or not there, but its log is.
+    #[error(
+        "{} is empty or not there, but its log {} is; bring the file back from a copy, or move the log away to begin anew",
+        file.display(), log.display()
+    )]
+    Lost {
+        /// The file.
+        file: PathBuf,
+        /// Its log.
+        log: PathBuf,
+    },
+    /// A log holds what was written last, and cannot be read without another file beside it.
+    #[error(
+        "{} holds what was written last to {} and cannot be read where no file can be made beside it; copy both to a \
+         folder that you may write",
+        log.display(), file.display()
+    )]
+    Log {
+        /// The file.
+        file: PathBuf,
+        /// Its log.
+        log: PathBuf,
+    },
+    /// No name is free for one more copy of a damaged file.
+    #[error(
+        "{} was not repaired: {copies} copies of earlier repairs lie beside it; move some away",
+        file.display()
+    )]
+    Copies {
+        /// The file.
+        file: PathBuf,
+        /// How many there are.
+        copies: u32,
+    },
     /// What was written could not be read again as it was; nothing was stored.
     #[error("{problem}; nothing was stored in {}, report it with this message", file.display())]
     NotReadable {

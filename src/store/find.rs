@@ -7,12 +7,12 @@ mod words;
 
 use std::collections::BTreeMap;
 
-use rusqlite::{Connection, OptionalExtension, Result, Transaction, TransactionBehavior};
+use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior};
 
 use super::database::Store;
 use super::error::{InFile, StoreError, is_damage};
 use super::read::{current_revision, damaged};
-use super::record::Summary;
+use super::results::Summary;
 use super::rows::rows;
 use crate::material::{Fit, Slug, SourceKind};
 use filter::summary;
@@ -21,24 +21,49 @@ pub use filter::Filter;
 pub use outline::OutlineEntry;
 pub use words::Match;
 
-/// What a list says in the place of the kind of a damaged material.
-pub const DAMAGED: &str = "damaged";
-
 impl Store {
     /// The current revisions of the materials that match a filter, sorted by name.
     ///
-    /// # Errors
-    /// When the file cannot be read.
-    pub fn find(&self, filter: &Filter) -> Result<Vec<Summary>, StoreError> {
-        filter::all(&self.conn, filter).in_file(&self.path)
-    }
-
-    /// The first `most` materials that match a filter, sorted by name. Does not read the others.
+    /// Up to 8 MiB, the lists of a database are compared with its materials first. Without a filter, a line that says
+    /// something else is marked as damaged; with one, it is an error, since the line may belong to other materials.
+    /// [`Store::damage`] compares databases of any size.
     ///
     /// # Errors
-    /// When the file cannot be read.
+    /// When the file cannot be read, or a list leaves out a material.
+    pub fn find(&self, filter: &Filter) -> Result<Vec<Summary>, StoreError> {
+        self.marked(filter, |conn| filter::all(conn, filter))
+    }
+
+    /// The first `most` materials that match a filter, sorted by name, as [`Store::find`] gives them. Does not read
+    /// the others.
+    ///
+    /// # Errors
+    /// As [`Store::find`].
     pub fn page(&self, filter: &Filter, most: u32) -> Result<Vec<Summary>, StoreError> {
-        filter::page(&self.conn, filter, most).in_file(&self.path)
+        self.marked(filter, |conn| filter::page(conn, filter, most))
+    }
+
+    /// Lines of the list of a filter; those that are not what is stored are marked.
+    fn marked(
+        &self,
+        filter: &Filter,
+        read: impl FnOnce(&Connection) -> rusqlite::Result<Vec<Summary>>,
+    ) -> Result<Vec<Summary>, StoreError> {
+        let marked = || {
+            let tx = moment(&self.conn)?;
+            let stale = stale::stale_lines(&tx, filter)?;
+            let mut lines = read(&tx)?;
+            for line in &mut lines {
+                line.is_damaged = stale.iter().any(|slug| slug == line.slug.as_str());
+            }
+            Ok(lines)
+        };
+        marked().in_file(&self.path)
+    }
+
+    /// Every line of the lists as it is.
+    pub(crate) fn lines(&self) -> Result<Vec<Summary>, StoreError> {
+        filter::all(&self.conn, &Filter::default()).in_file(&self.path)
     }
 
     /// Number of materials that match a filter, at most `most`. Does not count the others.
@@ -75,12 +100,15 @@ impl Store {
     }
 
     /// Kinds of the rendered models of materials in words, as
-    /// [`Material::rendered_words`](crate::material::Material::rendered_words) gives them, or that they are damaged. Does
-    /// not read the rest of the materials. Those without such words are left out.
+    /// [`Material::rendered_words`](crate::material::Material::rendered_words) gives them; `None` of a damaged material.
+    /// Does not read the rest of the materials. Those without such words are left out.
     ///
     /// # Errors
     /// When the file cannot be read.
-    pub fn rendered_words(&self, slugs: &[Slug]) -> Result<BTreeMap<Slug, String>, StoreError> {
+    pub fn rendered_words(
+        &self,
+        slugs: &[Slug],
+    ) -> Result<BTreeMap<Slug, Option<String>>, StoreError> {
         let mut words = match words_of(&self.conn, slugs) {
             Err(error) if is_damage(&error) => BTreeMap::new(),
             words => return words.in_file(&self.path),
@@ -89,7 +117,7 @@ impl Store {
         for slug in slugs {
             match words_of(&self.conn, std::slice::from_ref(slug)) {
                 Err(error) if is_damage(&error) => {
-                    words.insert(slug.clone(), DAMAGED.to_owned());
+                    words.insert(slug.clone(), None);
                 }
                 found => words.extend(found.in_file(&self.path)?),
             }
@@ -105,16 +133,27 @@ impl Store {
     /// short name begins with the words come first, the others in the order in which they were added.
     ///
     /// # Errors
-    /// When the file cannot be read.
+    /// When the file cannot be read; where the index of texts is not that of what is stored, which is compared up to
+    /// 8 MiB.
     pub fn search(&self, words: &str, most: u32) -> Result<Vec<Match>, StoreError> {
-        words::search(&self.conn, words, most).in_file(&self.path)
+        let found = || {
+            let tx = moment(&self.conn)?;
+            stale::check_texts(&tx)?;
+            words::search(&tx, words, most)
+        };
+        found().in_file(&self.path)
     }
 }
 
-fn one(conn: &Connection, slug: &Slug) -> Result<Option<Summary>> {
+/// A transaction in which another program's writes are not seen.
+pub(super) fn moment(conn: &Connection) -> rusqlite::Result<Transaction<'_>> {
+    Transaction::new_unchecked(conn, TransactionBehavior::Deferred)
+}
+
+fn one(conn: &Connection, slug: &Slug) -> rusqlite::Result<Option<Summary>> {
     let sql = "SELECT slug, name, class, revision, kind, status, curves, observations, fits
                FROM entry WHERE slug = ?1";
-    let tx = Transaction::new_unchecked(conn, TransactionBehavior::Deferred)?;
+    let tx = moment(conn)?;
     let found = tx.prepare_cached(sql)?.query_row([slug.as_str()], summary).optional()?;
     if found.is_none() && current_revision(&tx, slug)?.is_some() {
         return Err(damaged(format!("`{slug}` is there, but no list knows it")));
@@ -122,7 +161,7 @@ fn one(conn: &Connection, slug: &Slug) -> Result<Option<Summary>> {
     Ok(found)
 }
 
-fn words_of(conn: &Connection, slugs: &[Slug]) -> Result<BTreeMap<Slug, String>> {
+fn words_of(conn: &Connection, slugs: &[Slug]) -> rusqlite::Result<BTreeMap<Slug, Option<String>>> {
     let wanted = serde_json::json!(slugs).to_string();
     let sql = "SELECT slug, fit.estimator, source.kind, fit.curve,
                    EXISTS (SELECT 1 FROM curve AS own
@@ -146,7 +185,7 @@ fn words_of(conn: &Connection, slugs: &[Slug]) -> Result<BTreeMap<Slug, String>>
             (None, ..) if renders_a_curve => None,
             _ => return Err(damaged(format!("what scenes render of `{slug}` is not there"))),
         };
-        Ok(words.map(|words| (slug, words)))
+        Ok(words.map(|words| (slug, Some(words))))
     })?;
     Ok(found.into_iter().flatten().collect())
 }

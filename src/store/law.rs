@@ -1,10 +1,9 @@
 //! A scattering model in two tables: `fit.model` has its structure, `fit_parameter` the values of its parameters.
 
 use rusqlite::types::Type;
-use rusqlite::{Connection, Error, Result, Rows, Transaction, params};
+use rusqlite::{Connection, Error, Result, Transaction, params};
 use serde_json::Value;
 
-use super::error::is_damage;
 use super::rows::{parsed, rows};
 use crate::brdf::Brdf;
 
@@ -74,41 +73,6 @@ pub(super) fn left_in_structure(
         models.extend(serde_json::from_str(&text).ok().map(|model| (name, model)));
     }
     Ok(models)
-}
-
-/// The revisions with a fit or a record on a damaged page, in a file of an older schema. SQLite refuses to write within
-/// a transaction that has read such a page, so a migration must know them before it begins.
-pub(super) fn on_damaged_pages(conn: &Connection) -> Result<Vec<i64>> {
-    let sql = "SELECT name FROM sqlite_schema JOIN pragma_user_version WHERE type = 'table' AND (
-                   name IN ('activity', 'activity_input', 'origin', 'origin_author') AND user_version < 15
-                   OR name IN ('fit', 'fit_parameter', 'fit_covariance') AND user_version < 11)";
-    let tables: Vec<String> = rows(conn, sql, [], |row| row.get(0))?;
-    if tables.is_empty() {
-        return Ok(Vec::new());
-    }
-    let mut torn = Vec::new();
-    for revision_id in rows(conn, "SELECT id FROM revision", [], |row| row.get(0))? {
-        for table in &tables {
-            let sql = format!("SELECT * FROM {table} WHERE revision_id = ?1");
-            let mut statement = conn.prepare(&sql)?;
-            let columns = statement.column_count();
-            let read = rows_to_the_end(statement.query([revision_id])?, columns);
-            match read {
-                Err(error) if is_damage(&error) => torn.push(revision_id),
-                read => read?,
-            }
-        }
-    }
-    Ok(torn)
-}
-
-fn rows_to_the_end(mut rows: Rows, columns: usize) -> Result<()> {
-    while let Some(row) = rows.next()? {
-        for column in 0..columns {
-            row.get_ref(column)?;
-        }
-    }
-    Ok(())
 }
 
 /// Takes the values out of every `fit.model` of a revision of which `fit_parameter` has the same ones.

@@ -30,6 +30,7 @@ mod query;
 mod read;
 mod record;
 mod repair;
+mod results;
 mod row_check;
 mod rows;
 mod tables;
@@ -38,8 +39,8 @@ mod write;
 
 pub use database::Store;
 pub use error::StoreError;
-pub use find::{DAMAGED, Filter, Match, OutlineEntry};
-pub use record::{Addition, Removal, RevisionSummary, StoredRevision, Summary};
+pub use find::{Filter, Match, OutlineEntry};
 pub use repair::Repair;
+pub use results::{Addition, Removal, RevisionSummary, StoredRevision, Summary};
 pub use row_check::{Difference, RowCheck};
 pub use tables::{Cell, Column, ColumnKind, Reference, Table};

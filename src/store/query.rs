@@ -2,8 +2,8 @@
 
 use super::database::Store;
 use super::error::{InFile, StoreError};
-use super::find::Filter;
-use super::record::{RevisionSummary, StoredRevision, Summary};
+use super::find::{Filter, moment};
+use super::results::{RevisionSummary, StoredRevision, Summary};
 use super::{damage, read};
 use crate::brdf::Brdf;
 use crate::material::Slug;
@@ -93,7 +93,17 @@ impl Store {
     /// # Errors
     /// When the file cannot be read.
     pub fn damage(&self) -> Result<Vec<String>, StoreError> {
-        damage::damage(&self.conn).in_file(&self.path)
+        // One transaction: another program may write meanwhile.
+        moment(&self.conn).and_then(|tx| damage::damage(&tx)).in_file(&self.path)
+    }
+
+    /// How many revisions each material has that has lost earlier ones, as a sentence each. A repair leaves such gaps
+    /// where it cannot bring a revision back.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn lost_revisions(&self) -> Result<Vec<String>, StoreError> {
+        damage::lost_revisions(&self.conn).in_file(&self.path)
     }
 
     /// Whether a material of that name exists, sound or damaged, in the lists alone too.

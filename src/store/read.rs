@@ -2,7 +2,7 @@
 
 mod provenance;
 
-pub(super) use provenance::statistics;
+pub(super) use provenance::{command, origin, statistics};
 
 use rusqlite::ffi;
 use rusqlite::types::Type;
@@ -10,9 +10,9 @@ use rusqlite::{
     Connection, Error, OptionalExtension, Result, Row, Transaction, TransactionBehavior, params,
 };
 
-use super::law;
-use super::record::{Record, Recorded, RevisionSummary, StoredRevision};
+use super::results::{RevisionSummary, StoredRevision};
 use super::rows::{json, optional_json, rows};
+use super::{law, record};
 use crate::brdf::Brdf;
 use crate::formats::EffectEntry;
 use crate::material::{
@@ -54,38 +54,10 @@ pub(super) fn history(conn: &Connection, slug: &Slug) -> Result<Vec<RevisionSumm
     if found.is_empty() {
         check_absent(&tx, slug)?;
     }
-    let recorded = found.into_iter().map(|(id, summary)| check_record(&tx, id).map(|()| summary));
-    recorded.collect()
-}
-
-/// Fails where the record of a revision is not what was stored with its content.
-pub(super) fn check_record(conn: &Connection, revision_id: i64) -> Result<()> {
-    let found = recorded(conn, revision_id)?;
-    if found.is_as_stored() {
-        return Ok(());
+    for (id, summary) in &found {
+        record::check(&tx, *id, slug, summary.revision)?;
     }
-    let Record { slug, revision, .. } = found.record;
-    Err(damaged(format!(
-        "revision {revision} of `{slug}` has another number, date, program, command or origin than was stored"
-    )))
-}
-
-/// The record of a revision, and its hash.
-pub(super) fn recorded(conn: &Connection, revision_id: i64) -> Result<Recorded> {
-    let sql = "SELECT slug, number, content_hash, added_at, program_version, record_hash
-               FROM revision JOIN material ON material.id = material_id WHERE revision.id = ?1";
-    let activity = provenance::activity(conn, revision_id)?;
-    conn.prepare_cached(sql)?.query_row([revision_id], |row| {
-        let record = Record {
-            slug: row.get(0)?,
-            revision: row.get(1)?,
-            content_hash: row.get(2)?,
-            added_at: row.get(3)?,
-            program_version: row.get(4)?,
-            activity,
-        };
-        Ok(Recorded { record, hash: row.get(5)? })
-    })
+    Ok(found.into_iter().map(|(_, summary)| summary).collect())
 }
 
 /// Number of the current revision of a material. Scans the table, so that a damaged index cannot hide it. `None` when
@@ -101,6 +73,22 @@ pub(super) fn current_revision(conn: &Connection, slug: &Slug) -> Result<Option<
         return Err(damaged(format!("`{slug}` is in the lists, but its own row is not there")));
     }
     Ok(found)
+}
+
+/// A row of a revision.
+pub(super) struct RevisionRow {
+    pub id: i64,
+    pub number: u32,
+    pub content_hash: String,
+}
+
+/// The rows of the revisions of a material, by number.
+pub(super) fn revision_rows(conn: &Connection, slug: &Slug) -> Result<Vec<RevisionRow>> {
+    let sql = "SELECT revision.id, number, content_hash FROM revision
+               JOIN material ON material.id = material_id WHERE slug = ?1 ORDER BY number";
+    rows(conn, sql, [slug.as_str()], |row| {
+        Ok(RevisionRow { id: row.get(0)?, number: row.get(1)?, content_hash: row.get(2)? })
+    })
 }
 
 /// The greatest number of a revision of a material below this one.
@@ -155,7 +143,7 @@ pub(super) fn get(
     // One transaction: another program may write meanwhile.
     let tx = Transaction::new_unchecked(conn, TransactionBehavior::Deferred)?;
     let Some((revision_id, stored)) = found_in(&tx, slug, number)? else { return Ok(None) };
-    check_record(&tx, revision_id)?;
+    record::check(&tx, revision_id, slug, stored.revision)?;
     Ok(Some(stored))
 }
 
@@ -335,7 +323,11 @@ fn status(row: &Row, column: usize) -> Result<Status> {
 }
 
 /// Curves of a revision, or the one of this name.
-fn curves(conn: &Connection, revision_id: i64, only: Option<&str>) -> Result<Vec<Curve>> {
+pub(super) fn curves(
+    conn: &Connection,
+    revision_id: i64,
+    only: Option<&str>,
+) -> Result<Vec<Curve>> {
     let sql = "
         SELECT name, source, instrument, session, footprint, beam_rad, coalesce(relative, 0),
             coalesce(only_detected, 0)

@@ -1,23 +1,30 @@
 //! Repairs a damaged file as far as lost rows follow from the remaining ones, or from content that is at hand.
 
-use rusqlite::{Connection, Result, Transaction, params};
+use std::path::{Path, PathBuf};
+
+use rusqlite::{Result, Transaction, params};
 
 use super::damage::damage;
 use super::database::Store;
 use super::error::{InFile, StoreError, reason};
-use super::record::StoredRevision;
+use super::read::RevisionRow;
+use super::record::{self, Part};
+use super::results::StoredRevision;
 use super::row_check::RowCheck;
 use super::rows::rows;
 use super::tables::{schema, unit_rows};
-use super::{law, read, write};
+use super::{connect, law, read, unreachable, write};
 use crate::brdf::Brdf;
-use crate::material::{Activity, Input, Material, Slug};
+use crate::material::{Activity, Input, Material, Origin, Slug};
 
 /// Fits of a revision with values in `fit.model` that are tried one by one; further ones are tried together.
 const MOST_TRIED_APART: usize = 10;
 
 /// The command that is recorded with what a repair writes.
 const COMMAND: &str = "check --repair";
+
+/// Most copies of a database that repairs leave beside it.
+const MOST_COPIES: u32 = 99;
 
 /// Result of [`Store::repair`], a sentence each.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -26,45 +33,68 @@ pub struct Repair {
     pub mended: Vec<String>,
     /// Steps that failed, and why.
     pub failed: Vec<String>,
+    /// A copy of the file as it was before; none where nothing was repaired.
+    pub copy: Option<PathBuf>,
 }
 
 impl Store {
-    /// Repairs what can be repaired, in one transaction. Removes nothing that was measured or fitted: rows of lost
-    /// revisions stay until [`Store::remove_unreachable_rows`].
+    /// Repairs what can be repaired, in one transaction, after a copy of the file was written beside it.
     /// Rebuilds indexes, views, units, lists, searches and statistics from the content of revisions. Rewrites a
     /// revision with damaged content if one of `at_hand` has its hash. Restores the lost row of a material from its
     /// row in the lists, if the content then has the stored hash. Where the current revision of a material is lost,
-    /// repeats the latest sound one under a new number, so that no number changes its meaning. [`Store::damage`] and
-    /// the hashes of [`Store::get`] show the remaining damage.
+    /// repeats the latest sound one under a new number, so that no number changes its meaning. Replaces a damaged
+    /// command, date or origin of a sound revision. Removes rows that belong to no material. [`Store::damage`] and the
+    /// hashes of [`Store::get`] show the remaining damage.
     ///
     /// # Errors
-    /// When the file cannot be written, or SQLite cannot read it to the end.
+    /// When the file cannot be written or copied, or SQLite cannot read it to the end. Then it stays as it was.
     pub fn repair(&mut self, at_hand: &[Material]) -> std::result::Result<Repair, StoreError> {
         let mut row_check = RowCheck::new()?;
         let Store { conn, path, .. } = self;
-        repair(conn, &mut row_check, at_hand).in_file(path)
+        let tx = conn.transaction().in_file(path)?;
+        let mut repair = repair(&tx, &mut row_check, at_hand).in_file(path)?;
+        if !repair.mended.is_empty() && tx.path().is_some_and(|name| !name.is_empty()) {
+            let copy = copy_name(path)?;
+            connect::back_up(path, &copy)?;
+            repair.copy = Some(copy);
+        }
+        tx.commit().in_file(path)?;
+        Ok(repair)
     }
 }
 
-fn repair(conn: &mut Connection, row_check: &mut RowCheck, at_hand: &[Material]) -> Result<Repair> {
-    let tx = conn.transaction()?;
+/// A free name for a copy.
+fn copy_name(path: &Path) -> std::result::Result<PathBuf, StoreError> {
+    let name = |number: u32| {
+        let mut name = path.as_os_str().to_owned();
+        name.push(".before-repair");
+        if number > 1 {
+            name.push(format!("-{number}"));
+        }
+        PathBuf::from(name)
+    };
+    let free = (1..=MOST_COPIES).map(name).find(|path| path.symlink_metadata().is_err());
+    free.ok_or_else(|| StoreError::Copies { file: path.to_owned(), copies: MOST_COPIES })
+}
+
+fn repair(tx: &Transaction, row_check: &mut RowCheck, at_hand: &[Material]) -> Result<Repair> {
     tx.pragma_update(None, "defer_foreign_keys", true)?;
-    let before = damage(&tx)?;
+    let before = damage(tx)?;
     let mut repair = Repair::default();
-    let sound = if before.is_empty() { Vec::new() } else { sound_revisions(&tx) };
+    let sound = if before.is_empty() { Vec::new() } else { sound_revisions(tx) };
     let at_hand: Vec<&Material> = at_hand.iter().chain(&sound).collect();
-    repair.attempt(&tx, "tables, indexes and views", || own_schema(&tx, row_check))?;
-    repair.attempt(&tx, "indexes", || tx.execute_batch("REINDEX").map(|()| Vec::new()))?;
-    repair.attempt(&tx, "units of columns", || units(&tx, row_check))?;
-    for renamed in renamed_materials(&tx)? {
-        repair.attempt(&tx, &renamed.slug, || renamed_material(&tx, &renamed))?;
+    repair.attempt(tx, "tables, indexes and views", || own_schema(tx, row_check))?;
+    repair.attempt(tx, "indexes", || tx.execute_batch("REINDEX").map(|()| Vec::new()))?;
+    repair.attempt(tx, "units of columns", || units(tx, row_check))?;
+    for renamed in renamed_materials(tx)? {
+        repair.attempt(tx, &renamed.slug, || renamed_material(tx, &renamed))?;
     }
-    for lost in lost_materials(&tx)? {
-        repair.attempt(&tx, &lost.slug, || lost_material(&tx, &lost))?;
+    for lost in lost_materials(tx)? {
+        repair.attempt(tx, &lost.slug, || lost_material(tx, &lost))?;
     }
-    repair.attempt(&tx, "lists", || unreachable_lines(&tx))?;
+    repair.attempt(tx, "lists", || unreachable_lines(tx))?;
     let mut slugs = Vec::new();
-    let named: Vec<String> = rows(&tx, "SELECT slug FROM material", [], |row| row.get(0))?;
+    let named: Vec<String> = rows(tx, "SELECT slug FROM material", [], |row| row.get(0))?;
     for name in named {
         match name.parse::<Slug>() {
             Ok(slug) => slugs.push(slug),
@@ -72,17 +102,30 @@ fn repair(conn: &mut Connection, row_check: &mut RowCheck, at_hand: &[Material])
         }
     }
     for slug in &slugs {
-        repair.attempt(&tx, slug.as_str(), || revisions(&tx, row_check, slug, &at_hand))?;
-        repair.attempt(&tx, slug.as_str(), || records(&tx, slug))?;
-        repair.attempt(&tx, slug.as_str(), || latest_revision(&tx, slug))?;
-        repair.attempt(&tx, slug.as_str(), || lost_current_revision(&tx, slug))?;
+        for row in read::revision_rows(tx, slug).unwrap_or_default() {
+            let place = format!("{slug}@{}", row.number);
+            repair.attempt(tx, &place, || revision(tx, row_check, slug, &row, &at_hand))?;
+            repair.attempt(tx, &place, || record_of(tx, slug, &row))?;
+        }
+        repair.attempt(tx, slug.as_str(), || latest_revision(tx, slug))?;
+        repair.attempt(tx, slug.as_str(), || lost_current_revision(tx, slug))?;
     }
-    repair.attempt(&tx, "lists and searches", || lists(&tx, &slugs))?;
-    if repair.mended.is_empty() && damage(&tx)? != before {
+    repair.attempt(tx, "lists and searches", || lists(tx, &slugs))?;
+    repair.attempt(tx, "rows of no material", || unreachable_rows(tx))?;
+    if repair.mended.is_empty() && damage(tx)? != before {
         repair.mended.push("indexes, lists and searches were made anew".to_owned());
     }
-    tx.commit()?;
     Ok(repair)
+}
+
+/// Removes rows that belong to no material.
+fn unreachable_rows(tx: &Transaction) -> Result<Vec<String>> {
+    let rows = unreachable::count(tx)?;
+    if rows == 0 {
+        return Ok(Vec::new());
+    }
+    unreachable::remove(tx)?;
+    Ok(vec![format!("{rows} rows of lost revisions belonged to no material and were removed")])
 }
 
 impl Repair {
@@ -151,11 +194,9 @@ fn sound_revisions(tx: &Transaction) -> Vec<Material> {
         rows(tx, "SELECT slug FROM material", [], |row| row.get(0)).unwrap_or_default();
     let mut sound = Vec::new();
     for slug in named.iter().filter_map(|name| name.parse::<Slug>().ok()) {
-        let sql = "SELECT number FROM revision JOIN material ON material.id = material_id WHERE slug = ?1";
-        let numbers: Vec<u32> =
-            rows(tx, sql, [slug.as_str()], |row| row.get(0)).unwrap_or_default();
+        let listed = read::revision_rows(tx, &slug).unwrap_or_default();
         let read =
-            numbers.iter().filter_map(|number| read::get_in(tx, &slug, Some(*number)).ok()?);
+            listed.iter().filter_map(|row| read::get_in(tx, &slug, Some(row.number)).ok()?);
         sound.extend(read.filter(is_as_stored).map(|stored| stored.material));
     }
     sound
@@ -189,49 +230,48 @@ fn renamed_material(tx: &Transaction, renamed: &LostMaterial) -> Result<Vec<Stri
     Ok(Vec::new())
 }
 
-/// Records the repair in revisions with their stored content and another record.
-fn records(tx: &Transaction, slug: &Slug) -> Result<Vec<String>> {
-    let sql = "SELECT revision.id, number, content_hash FROM revision
-               JOIN material ON material.id = material_id WHERE slug = ?1 ORDER BY number";
-    let found: Vec<(i64, u32, String)> =
-        rows(tx, sql, [slug.as_str()], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
-    let most = found.last().map_or(0, |(_, number, _)| *number);
-    let mut mended = Vec::new();
-    for (id, number, content_hash) in found {
-        let stored = read::get_in(tx, slug, Some(number)).ok().flatten();
-        let Some(StoredRevision { material, .. }) = stored.filter(is_as_stored) else { continue };
-        if write::has_its_record(tx, id) {
-            continue;
-        }
-        let found = read::recorded(tx, id)?;
-        if found.is_renumbered(most) {
-            return Err(read::damaged(format!(
-                "revision {number} was stored under another number"
-            )));
-        }
-        let by = Activity {
-            command: COMMAND.to_owned(),
-            inputs: vec![Input { name: format!("{slug}@{number}"), hash: content_hash }],
-            origin: found.record.activity.and_then(|activity| activity.origin),
-        };
-        write::replace_activity(tx, id, Some(&by))?;
-        // A revision with a command has statistics.
-        write::rewrite(tx, id, &material)?;
-        mended.push(format!(
-            "`{slug}` had another date, program, command or origin of its revision {number} than was stored; the command \
-             is now `{COMMAND}`, and the rest stays as it is"
-        ));
-    }
-    Ok(mended)
+/// A revision of a material if it has its stored content.
+fn sound_revision(tx: &Transaction, slug: &Slug, number: u32) -> Option<StoredRevision> {
+    read::get_in(tx, slug, Some(number)).ok().flatten().filter(is_as_stored)
 }
 
-/// Makes the latest revision of a material the current one.
+/// What is recorded with a revision that a repair takes from this one.
+fn repaired_from(slug: &Slug, row: &RevisionRow, origin: Option<Origin>) -> Activity {
+    let name = format!("{slug}@{}", row.number);
+    let inputs = vec![Input { name, hash: row.content_hash.clone() }];
+    Activity { command: COMMAND.to_owned(), inputs, origin }
+}
+
+/// Replaces the damaged parts of the record of a revision with its stored content.
+fn record_of(tx: &Transaction, slug: &Slug, row: &RevisionRow) -> Result<Vec<String>> {
+    if sound_revision(tx, slug, row.number).is_none() {
+        return Ok(Vec::new());
+    }
+    let changed = record::restore(tx, row.id, Some(&repaired_from(slug, row, None)))?;
+    let words = changed.iter().filter_map(|part| match part {
+        Part::Number => None,
+        Part::Date => Some("its date is that of the repair now"),
+        Part::Command => Some("its command is `check --repair` now"),
+        Part::Origin => Some("its origin was removed"),
+    });
+    let words: Vec<&str> = words.collect();
+    Ok((!changed.is_empty())
+        .then(|| {
+            let (parts, words) = (record::listed(&changed), words.join(", "));
+            format!("`{slug}@{}` had another {parts} than was stored; {words}", row.number)
+        })
+        .into_iter()
+        .collect())
+}
+
+/// Makes the latest revision of a material the current one, if that is its number.
 fn latest_revision(tx: &Transaction, slug: &Slug) -> Result<Vec<String>> {
-    let sql = "UPDATE material SET current_revision =
-                   (SELECT max(number) FROM revision WHERE material_id = material.id)
-               WHERE slug = ?1 AND current_revision <
-                   (SELECT max(number) FROM revision WHERE material_id = material.id)";
-    let changed = tx.execute(sql, [slug.as_str()])?;
+    let Some(latest) = read::revision_rows(tx, slug)?.pop() else { return Ok(Vec::new()) };
+    if !record::has_its_number(tx, latest.id)? {
+        return Ok(Vec::new());
+    }
+    let sql = "UPDATE material SET current_revision = ?2 WHERE slug = ?1 AND current_revision < ?2";
+    let changed = tx.execute(sql, params![slug.as_str(), latest.number])?;
     Ok((changed > 0)
         .then(|| format!("the latest revision of `{slug}` is its current one again"))
         .into_iter()
@@ -297,73 +337,71 @@ fn unreachable_lines(tx: &Transaction) -> Result<Vec<String>> {
         .collect())
 }
 
-/// Where the current revision of a material is lost, repeats the latest sound one as a new revision.
+/// Where the current revision of a material is lost, repeats the latest sound one as a new revision, unless the lost one
+/// had another status, or another revision has not the number with which it was stored.
 fn lost_current_revision(tx: &Transaction, slug: &Slug) -> Result<Vec<String>> {
-    let sql = "SELECT current_revision FROM material WHERE slug = ?1 AND NOT EXISTS
+    let sql = "SELECT current_revision, status FROM material
+               LEFT JOIN entry ON entry.material_id = material.id WHERE material.slug = ?1 AND NOT EXISTS
                (SELECT 1 FROM revision WHERE material_id = material.id AND number = current_revision)";
-    let lost: Vec<i64> = rows(tx, sql, [slug.as_str()], |row| row.get(0))?;
-    let Some(lost) = lost.first() else { return Ok(Vec::new()) };
-    let sql = "SELECT number FROM revision JOIN material ON material.id = material_id
-               WHERE slug = ?1 ORDER BY number DESC";
-    let numbers: Vec<u32> = rows(tx, sql, [slug.as_str()], |row| row.get(0))?;
-    for number in numbers {
-        let stored = read::get_in(tx, slug, Some(number)).ok().flatten();
-        let sound = stored.filter(is_as_stored);
-        if let Some(StoredRevision { material, activity, content_hash, .. }) = sound {
-            let repeated = Input { name: format!("{slug}@{number}"), hash: content_hash };
-            let by = Activity {
-                command: COMMAND.to_owned(),
-                inputs: vec![repeated],
-                // Whoever answers for the content answers for its repetition.
-                origin: activity.and_then(|activity| activity.origin),
-            };
-            let added = write::MaterialWriter::new(tx).add(&material, Some(&by))?.revision();
-            return Ok(vec![format!(
-                "`{slug}` has lost its revision {lost}; revision {added} repeats revision {number}"
-            )]);
+    let lost: Vec<(i64, Option<String>)> =
+        rows(tx, sql, [slug.as_str()], |row| Ok((row.get(0)?, row.get(1)?)))?;
+    let Some((lost, status)) = lost.into_iter().next() else { return Ok(Vec::new()) };
+    for row in read::revision_rows(tx, slug)?.into_iter().rev() {
+        let Some(StoredRevision { material, activity, .. }) = sound_revision(tx, slug, row.number)
+        else {
+            continue;
+        };
+        let number = row.number;
+        if !record::has_its_number(tx, row.id)? {
+            return Err(read::damaged(format!(
+                "its revision {lost} is lost, and what is called revision {number} was stored under another number"
+            )));
         }
+        if status.as_deref() != Some(material.status.as_str()) {
+            return Err(read::damaged(format!(
+                "its revision {lost} is lost, and may have had another status than revision {number}, the latest that is \
+                 sound; add the material again"
+            )));
+        }
+        // Whoever answers for the content answers for its repetition.
+        let origin = activity.and_then(|activity| activity.origin);
+        let by = repaired_from(slug, &row, origin);
+        let added = write::MaterialWriter::new(tx).add(&material, Some(&by))?.revision();
+        return Ok(vec![format!(
+            "`{slug}` has lost its revision {lost}; revision {added} repeats revision {number}"
+        )]);
     }
     Ok(Vec::new())
 }
 
-/// Rewrites revisions of a material with another content than their hash says, or with wrong derived rows.
-fn revisions(
+/// Rewrites a revision with another content than its hash says, or with wrong derived rows.
+fn revision(
     tx: &Transaction,
     row_check: &mut RowCheck,
     slug: &Slug,
+    row: &RevisionRow,
     at_hand: &[&Material],
 ) -> Result<Vec<String>> {
-    let sql = "SELECT revision.id, number, content_hash FROM revision
-               JOIN material ON material.id = material_id WHERE slug = ?1 ORDER BY number";
-    let listed: Vec<(i64, u32, String)> =
-        rows(tx, sql, [slug.as_str()], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
-    let mut mended = Vec::new();
-    for (id, number, hash) in listed {
-        let place = format!("`{slug}@{number}`");
-        let stored = read::get_in(tx, slug, Some(number)).ok().flatten();
-        if let Some(stored) = stored {
-            if stored.material.content_hash() == hash {
-                if !row_check.compare(tx, &stored)?.is_empty() {
-                    write::rewrite(tx, id, &stored.material)?;
-                    mended.push(format!("{place} was written anew"));
-                }
-                continue;
-            }
-            if let Some((by_structure, fits)) = by_structure(tx, id, &stored.material, &hash)? {
-                write::rewrite(tx, id, &by_structure)?;
-                mended.push(format!(
-                    "{place} was written anew with the values in `fit.model` of {fits}: its hash covers them, and not \
-                     those in `fit_parameter`"
-                ));
-                continue;
-            }
+    let RevisionRow { id, number, content_hash } = row;
+    let place = format!("`{slug}@{number}`");
+    let anew = |content: &Material| {
+        write::rewrite(tx, *id, content).map(|()| vec![format!("{place} was written anew")])
+    };
+    if let Some(stored) = read::get_in(tx, slug, Some(*number)).ok().flatten() {
+        if is_as_stored(&stored) {
+            let differences = row_check.compare(tx, &stored)?;
+            return if differences.is_empty() { Ok(Vec::new()) } else { anew(&stored.material) };
         }
-        if let Some(content) = at_hand.iter().find(|material| material.content_hash() == hash) {
-            write::rewrite(tx, id, content)?;
-            mended.push(format!("{place} was written anew"));
+        if let Some((by_structure, fits)) = by_structure(tx, *id, &stored.material, content_hash)? {
+            write::rewrite(tx, *id, &by_structure)?;
+            return Ok(vec![format!(
+                "{place} was written anew with the values in `fit.model` of {fits}: its hash covers them, and not \
+                 those in `fit_parameter`"
+            )]);
         }
     }
-    Ok(mended)
+    let content = at_hand.iter().find(|material| material.content_hash() == *content_hash);
+    content.map_or(Ok(Vec::new()), |content| anew(content))
 }
 
 /// The content of this hash that some fits of a revision give with the values that migration 11 has left in
@@ -398,15 +436,20 @@ fn by_structure(
     Ok(None)
 }
 
-/// Rebuilds lists and searches. A material that cannot be read keeps its rows there.
+/// Rebuilds lists and searches. Where the current revision is not what was stored, they keep what they say of it.
 fn lists(tx: &Transaction, slugs: &[Slug]) -> Result<Vec<String>> {
     tx.execute("INSERT INTO search (search) VALUES ('rebuild')", [])?;
     let mut adding = write::MaterialWriter::new(tx);
     for slug in slugs {
         let Ok(Some(stored)) = read::get_in(tx, slug, None) else { continue };
-        let sql = "SELECT id FROM material WHERE slug = ?1";
-        let material_id = tx.query_row(sql, [slug.as_str()], |row| row.get(0))?;
-        adding.queue(material_id, &stored.material)?;
+        let sql = "SELECT material.id, revision.id FROM material
+                   JOIN revision ON material_id = material.id AND number = current_revision
+                   WHERE slug = ?1";
+        let (material_id, revision_id) =
+            tx.query_row(sql, [slug.as_str()], |row| Ok((row.get(0)?, row.get(1)?)))?;
+        if is_as_stored(&stored) && record::has_its_number(tx, revision_id)? {
+            adding.queue(material_id, &stored.material)?;
+        }
     }
     adding.finish().map(|()| Vec::new())
 }
@@ -438,7 +481,7 @@ mod tests {
             let emptied =
                 store.conn.execute(&format!("DELETE FROM \"{}\"", table.name), []).unwrap();
             store.conn.pragma_update(None, "foreign_keys", true).unwrap();
-            let Repair { mended, failed } = store.repair(std::slice::from_ref(&paint)).unwrap();
+            let Repair { mended, failed, .. } = store.repair(std::slice::from_ref(&paint)).unwrap();
             assert_eq!(failed, Vec::<String>::new());
             assert_eq!(mended.is_empty(), emptied == 0, "{}: {mended:?}", table.name);
             assert_eq!(store.get(&paint.slug, None).unwrap().unwrap().material, paint);

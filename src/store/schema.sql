@@ -31,7 +31,7 @@ CREATE TABLE revision (
     CHECK (status IN ('active', 'superseded', 'withdrawn')), status_reason TEXT
     CHECK ((status_reason IS NULL) = (status = 'active')), superseded_by TEXT
     CHECK ((superseded_by IS NOT NULL) = (status = 'superseded')), finish TEXT, unknown TEXT NOT NULL DEFAULT '[]'
-    CHECK (json_type(unknown) = 'array'), record_hash TEXT CHECK (length(record_hash) = 64),
+    CHECK (json_type(unknown) = 'array'),
     UNIQUE (material_id, number)
 ) STRICT;
 
@@ -499,6 +499,14 @@ LEFT JOIN fit_lobes AS l ON l.revision_id = revision.id AND l.fit = fit.name
 JOIN source ON source.revision_id = revision.id AND source.key = fit.source
 WHERE NOT EXISTS (SELECT 1 FROM fit_parameter AS p
     WHERE p.revision_id = e.revision_id AND p.fit = e.fit AND p.path = e.name);
+
+CREATE TABLE record (
+    revision_id  INTEGER PRIMARY KEY REFERENCES revision (id) ON DELETE CASCADE,
+    number_hash  TEXT CHECK (length(number_hash) = 64),             -- name, number and content hash
+    date_hash    TEXT CHECK (length(date_hash) = 64),               -- date and program version
+    command_hash TEXT CHECK (length(command_hash) = 64),            -- command and its inputs
+    origin_hash  TEXT CHECK (length(origin_hash) = 64)              -- catalogue it was imported from
+) STRICT;
 
 INSERT INTO unit VALUES ('aperture_m', 'm', 'diameter of the antenna');
 

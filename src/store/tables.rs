@@ -3,6 +3,7 @@
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, Result};
 
+use super::connect::LATEST_SCHEMA;
 use super::database::Store;
 use super::error::{InFile, StoreError};
 use super::law;
@@ -217,13 +218,14 @@ pub(super) fn quoted(name: &str) -> String {
 }
 
 /// Tables that record who made a revision, which does not follow from its content.
-pub(super) const MAKING: [&str; 4] = ["activity", "activity_input", "origin", "origin_author"];
+pub(super) const MAKING: [&str; 5] =
+    ["record", "activity", "activity_input", "origin", "origin_author"];
 
-/// Whether the revision must have statistics: older programs did not write them.
-pub(super) fn has_statistics(conn: &Connection, revision_id: i64) -> Result<bool> {
-    let sql = "SELECT EXISTS (SELECT 1 FROM activity WHERE revision_id = ?1)
-               OR EXISTS (SELECT 1 FROM curve_statistic WHERE revision_id <= ?1)";
-    conn.query_row(sql, [revision_id], |row| row.get(0))
+/// The tables that this program makes. What others have made beside them is left alone.
+pub(super) fn own_tables(conn: &Connection) -> Result<Vec<Table>> {
+    let mut tables = tables(conn)?;
+    tables.retain(|table| LATEST_SCHEMA.contains(&format!("CREATE TABLE {} (", table.name)));
+    Ok(tables)
 }
 
 /// Whether every row of a table follows from the content of a revision.

@@ -2,36 +2,11 @@
 
 use rusqlite::{Connection, Result};
 
-use super::database::Store;
-use super::error::{InFile, StoreError};
-use super::tables::{quoted, tables};
+use super::tables::{own_tables, quoted};
 
 /// Revisions of no material. Those of a material that is still in a list are not among them: its row can come back.
 const REVISIONS: &str = "material_id NOT IN (SELECT id FROM material)
                          AND material_id NOT IN (SELECT material_id FROM entry)";
-
-impl Store {
-    /// Number of rows that belong to no material. No command reads them, and a new revision could take their number.
-    ///
-    /// # Errors
-    /// When the file cannot be read.
-    pub fn unreachable_rows(&self) -> std::result::Result<u64, StoreError> {
-        count(&self.conn).in_file(&self.path)
-    }
-
-    /// Removes the rows that belong to no material; how many they were. Copy the database first: what they say is in
-    /// no other row.
-    ///
-    /// # Errors
-    /// When the file cannot be written.
-    pub fn remove_unreachable_rows(&mut self) -> std::result::Result<u64, StoreError> {
-        let Store { conn, path, .. } = self;
-        let tx = conn.transaction().in_file(path)?;
-        let removed = count(&tx).and_then(|rows| remove(&tx).map(|()| rows)).in_file(path)?;
-        tx.commit().in_file(path)?;
-        Ok(removed)
-    }
-}
 
 /// The condition of each table under which one of its rows belongs to no material.
 fn conditions(conn: &Connection) -> Result<Vec<(String, String)>> {
@@ -39,7 +14,7 @@ fn conditions(conn: &Connection) -> Result<Vec<(String, String)>> {
         "revision_id NOT IN (SELECT id FROM revision)
          OR revision_id IN (SELECT id FROM revision WHERE {REVISIONS})"
     );
-    let tables = tables(conn)?.into_iter();
+    let tables = own_tables(conn)?.into_iter();
     let has_revision = |columns: &[super::Column]| columns.iter().any(|c| c.name == "revision_id");
     let conditions = tables
         .filter(|table| has_revision(&table.columns))
@@ -47,7 +22,8 @@ fn conditions(conn: &Connection) -> Result<Vec<(String, String)>> {
     Ok(conditions.chain([("revision".to_owned(), REVISIONS.to_owned())]).collect())
 }
 
-fn count(conn: &Connection) -> Result<u64> {
+/// Number of rows that belong to no material. No command reads them, and a new revision could take their number.
+pub(super) fn count(conn: &Connection) -> Result<u64> {
     let mut rows = 0;
     for (table, condition) in conditions(conn)? {
         let sql = format!("SELECT count(*) FROM {table} WHERE {condition}");
@@ -56,7 +32,8 @@ fn count(conn: &Connection) -> Result<u64> {
     Ok(rows)
 }
 
-fn remove(conn: &Connection) -> Result<()> {
+/// Removes them. What they say is in no other row.
+pub(super) fn remove(conn: &Connection) -> Result<()> {
     conn.pragma_update(None, "defer_foreign_keys", true)?;
     for (table, condition) in conditions(conn)? {
         conn.execute(&format!("DELETE FROM {table} WHERE {condition}"), [])?;

@@ -11,10 +11,10 @@ use serde::Serialize;
 use super::error::is_damage;
 use super::find::outline::{self, OutlineEntry};
 use super::pages::check_pages;
-use super::record::{Addition, Removal};
+use super::results::{Addition, Removal};
 use super::rows::rows;
-use super::tables::{MAKING, follows_from_content, has_statistics, tables};
-use super::{law, read};
+use super::tables::{follows_from_content, own_tables};
+use super::{law, read, record};
 use crate::formats::EffectEntry;
 use crate::material::{Activity, Covariance, Curve, Fit, Illumination, Material, Slug};
 use crate::measure::statistics::by_angle;
@@ -46,15 +46,13 @@ impl<'a> MaterialWriter<'a> {
         let tx = self.tx;
         let content_hash = material.content_hash();
         let (added, material_id) = match current(tx, &material.slug)? {
-            Some(current) if is_intact(tx, material, &current, &content_hash) => {
+            Some(current) if is_intact(tx, material, &current, &content_hash)? => {
                 return Ok(Addition::Unchanged(current.number));
             }
             Some(Current { material_id, number, content_hash: Some((revision_id, stored)) })
-                if stored == content_hash && !is_renumbered(tx, revision_id, number) =>
+                if stored == content_hash && record::has_its_number(tx, revision_id)? =>
             {
-                if !has_its_record(tx, revision_id) {
-                    replace_activity(tx, revision_id, activity)?;
-                }
+                record::restore(tx, revision_id, activity)?;
                 rewrite(tx, revision_id, material)?;
                 (Addition::Repaired(number), material_id)
             }
@@ -146,26 +144,23 @@ fn bring_to_one_value(tx: &Transaction, revision_id: i64) -> Result<()> {
     fits.iter().try_for_each(|fit| Rows { tx, revision_id }.numbers(fit))
 }
 
-/// Computes the hashes of records that an older program did not store. A damaged record gets none.
-pub(super) fn fill_records(tx: &Transaction, torn: &[i64]) -> Result<()> {
-    // A revision of no material has no record.
-    let sql = "SELECT revision.id FROM revision JOIN material ON material.id = material_id
-               WHERE record_hash IS NULL";
+/// Computes the statistics of curves that an older program did not store.
+pub(super) fn fill_statistics(tx: &Transaction, torn: &[i64]) -> Result<()> {
+    let sql = "SELECT DISTINCT revision_id FROM curve
+               WHERE revision_id NOT IN (SELECT revision_id FROM curve_statistic)";
     let revisions: Vec<i64> = rows(tx, sql, [], |row| row.get(0))?;
     for revision_id in revisions.into_iter().filter(|id| !torn.contains(id)) {
-        match write_record_hash(tx, revision_id) {
-            Err(error) if !is_damage(&error) => return Err(error),
-            _ => {}
+        let curves = match read::curves(tx, revision_id, None) {
+            // A damaged curve has none.
+            Err(error) if is_damage(&error) => continue,
+            curves => curves?,
+        };
+        for curve in curves {
+            let statistics = by_angle(&curve.observations);
+            Rows { tx, revision_id }.statistics(&curve.name, &statistics)?;
         }
     }
     Ok(())
-}
-
-/// Stores the hash of the record that a revision has.
-fn write_record_hash(tx: &Transaction, revision_id: i64) -> Result<()> {
-    let hash = read::recorded(tx, revision_id)?.record.hash();
-    let sql = "UPDATE revision SET record_hash = ?2 WHERE id = ?1";
-    tx.prepare_cached(sql)?.execute(params![revision_id, hash]).map(|_| ())
 }
 
 /// Removes materials with all their rows, all or none.
@@ -226,35 +221,12 @@ fn current(tx: &Transaction, slug: &Slug) -> Result<Option<Current>> {
         .optional()
 }
 
-/// Whether the current revision has the content of a material, and its hash.
-fn is_intact(tx: &Transaction, material: &Material, current: &Current, hash: &str) -> bool {
-    current.content_hash.as_ref().is_some_and(|(id, stored)| {
-        stored == hash && has_its_record(tx, *id) && read_back(tx, material, hash).is_ok()
-    })
-}
-
-/// Whether the record of a revision is as it was stored.
-pub(super) fn has_its_record(tx: &Transaction, revision_id: i64) -> bool {
-    read::recorded(tx, revision_id).is_ok_and(|found| found.is_as_stored())
-}
-
-/// Whether a revision was stored under another number, of those up to `most`.
-fn is_renumbered(tx: &Transaction, revision_id: i64, most: u32) -> bool {
-    read::recorded(tx, revision_id).is_ok_and(|found| found.is_renumbered(most))
-}
-
-/// Replaces what is recorded of the making of a revision; its number, date and program stay.
-pub(super) fn replace_activity(
-    tx: &Transaction,
-    revision_id: i64,
-    activity: Option<&Activity>,
-) -> Result<()> {
-    for table in MAKING.iter().rev() {
-        tx.execute(&format!("DELETE FROM {table} WHERE revision_id = ?1"), [revision_id])?;
-    }
-    let rows = Rows { tx, revision_id };
-    activity.map_or(Ok(()), |activity| rows.activity(activity))?;
-    write_record_hash(tx, revision_id)
+/// Whether the current revision has the content of a material, its hash, and its record.
+fn is_intact(tx: &Transaction, material: &Material, current: &Current, hash: &str) -> Result<bool> {
+    let Some((id, stored)) = &current.content_hash else { return Ok(false) };
+    Ok(stored == hash
+        && record::changed(tx, *id)?.is_empty()
+        && read_back(tx, material, hash).is_ok())
 }
 
 /// One more than the greatest revision number of a material.
@@ -280,8 +252,7 @@ fn read_back(tx: &Transaction, material: &Material, content_hash: &str) -> Resul
 /// Rewrites the rows of a revision. Its activity, date and program version stay.
 pub(super) fn rewrite(tx: &Transaction, revision_id: i64, material: &Material) -> Result<()> {
     tx.pragma_update(None, "defer_foreign_keys", true)?;
-    let is_with_statistics = has_statistics(tx, revision_id)?;
-    for table in tables(tx)?.iter().filter(|table| follows_from_content(table)) {
+    for table in own_tables(tx)?.iter().filter(|table| follows_from_content(table)) {
         let sql = format!("DELETE FROM \"{}\" WHERE revision_id = ?1", table.name);
         tx.execute(&sql, [revision_id])?;
     }
@@ -289,12 +260,7 @@ pub(super) fn rewrite(tx: &Transaction, revision_id: i64, material: &Material) -
     let values = values.collect::<Vec<_>>().join(", ");
     let update = format!("UPDATE revision SET ({CONTENT}) = ({values}) WHERE id = {revision_id}");
     tx.execute(&update, params_from_iter(content(material)?))?;
-    Rows { tx, revision_id }.material(material)?;
-    if !is_with_statistics {
-        // Otherwise later revisions of the program that wrote none would need statistics, too.
-        tx.execute("DELETE FROM curve_statistic WHERE revision_id = ?1", [revision_id])?;
-    }
-    Ok(())
+    Rows { tx, revision_id }.material(material)
 }
 
 /// Writes a material into an empty database, without lists and searches.
@@ -363,14 +329,14 @@ fn revision(
     let rows = Rows { tx, revision_id };
     rows.material(material)?;
     activity.map_or(Ok(()), |activity| rows.activity(activity))?;
-    write_record_hash(tx, revision_id)?;
+    record::write(tx, revision_id)?;
     Ok(material_id)
 }
 
 /// Writes the rows that belong to one revision.
-struct Rows<'a> {
-    tx: &'a Transaction<'a>,
-    revision_id: i64,
+pub(super) struct Rows<'a> {
+    pub tx: &'a Transaction<'a>,
+    pub revision_id: i64,
 }
 
 impl Rows<'_> {

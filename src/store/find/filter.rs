@@ -4,7 +4,7 @@ use rusqlite::types::Value;
 use rusqlite::{Connection, Result, Row, params_from_iter};
 
 use crate::material::{Fit, Material, SourceKind};
-use crate::store::record::Summary;
+use crate::store::results::Summary;
 use crate::store::rows::rows;
 
 /// Conditions on a material, all of which must hold.
@@ -57,6 +57,7 @@ pub(super) fn summary(row: &Row) -> Result<Summary> {
         curves: row.get(6)?,
         observations: row.get(7)?,
         fits: row.get(8)?,
+        is_damaged: false,
     })
 }
 

@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use rusqlite::{Connection, Result, Row, params, params_from_iter};
 
 use super::filter::{self, Filter};
+use super::moment;
+use super::stale::check_outlines;
 use crate::brdf::{Brdf, Outline};
 use crate::material::{Lobes, Slug};
 use crate::radar::Footprint;
@@ -36,9 +38,15 @@ impl Store {
     /// Outlines of the materials that match a filter, sorted by name.
     ///
     /// # Errors
-    /// When the file cannot be read.
+    /// When the file cannot be read; where a list or an outline is not that of what is stored, which is compared up to
+    /// 8 MiB.
     pub fn outlines(&self, filter: &Filter) -> std::result::Result<Vec<OutlineEntry>, StoreError> {
-        all(&self.conn, filter).in_file(&self.path)
+        let found = || {
+            let tx = moment(&self.conn)?;
+            check_outlines(&tx, filter)?;
+            all(&tx, filter)
+        };
+        found().in_file(&self.path)
     }
 }
 

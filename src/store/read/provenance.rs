@@ -173,6 +173,15 @@ fn findings(conn: &Connection, revision_id: i64) -> Result<Vec<Finding>> {
 
 /// The command that made a revision, with its inputs and origin.
 pub(super) fn activity(conn: &Connection, revision_id: i64) -> Result<Option<Activity>> {
+    let Some((command, inputs)) = command(conn, revision_id)? else { return Ok(None) };
+    Ok(Some(Activity { command, inputs, origin: origin(conn, revision_id)? }))
+}
+
+/// The command that made a revision, with its inputs.
+pub(in crate::store) fn command(
+    conn: &Connection,
+    revision_id: i64,
+) -> Result<Option<(String, Vec<Input>)>> {
     let sql = "SELECT command FROM activity WHERE revision_id = ?1";
     let command =
         conn.prepare_cached(sql)?.query_row([revision_id], |row| row.get(0)).optional()?;
@@ -180,10 +189,11 @@ pub(super) fn activity(conn: &Connection, revision_id: i64) -> Result<Option<Act
     let sql = "SELECT name, hash FROM activity_input WHERE revision_id = ?1 ORDER BY position";
     let inputs =
         rows(conn, sql, [revision_id], |row| Ok(Input { name: row.get(0)?, hash: row.get(1)? }))?;
-    Ok(Some(Activity { command, inputs, origin: origin(conn, revision_id)? }))
+    Ok(Some((command, inputs)))
 }
 
-fn origin(conn: &Connection, revision_id: i64) -> Result<Option<Origin>> {
+/// The catalogue from which a revision was imported.
+pub(in crate::store) fn origin(conn: &Connection, revision_id: i64) -> Result<Option<Origin>> {
     let sql = "SELECT title, version, doi, url, revision, added_at, program_version, command
                FROM origin WHERE revision_id = ?1";
     let found = rows(conn, sql, [revision_id], |row| {
