@@ -49,9 +49,12 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
 }
 
 fn text(report: &CheckReport, file: &str) -> String {
-    let CheckReport { revisions, curves, fits, surface_lobes, repaired, copy, findings, .. } = report;
+    let CheckReport { revisions, curves, fits, surface_lobes, repaired, copy, findings, .. } =
+        report;
     let mut text: String = repaired.iter().map(|what| format!("{file}: {what}\n")).collect();
-    text.extend(copy.iter().map(|copy| format!("{}: as it was before the repair\n", copy.display())));
+    text.extend(
+        copy.iter().map(|copy| format!("{}: as it was before the repair\n", copy.display())),
+    );
     text.extend(findings.iter().map(|wrong| format!("{wrong}\n")));
     text += &format!(
         "looked at {} and {} and made {} again in {file}: {}\n",

@@ -42,15 +42,16 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         // This revision is sound.
         Some(Err(StoreError::Corrupt { problem, .. })) => {
             console.notice(&format!("its revisions are not listed: {problem}"));
-            Vec::new()
+            None
         }
-        history => history.transpose()?.unwrap_or_default(),
+        history => Some(history.transpose()?.unwrap_or_default()),
     };
     let mut text = describe(&material, &origin)?;
-    if !history.is_empty() {
+    let listed = history.as_deref().unwrap_or_default();
+    if !listed.is_empty() {
         text += "\nrevisions:\n";
     }
-    for RevisionSummary { revision, added_at, program_version, origin } in &history {
+    for RevisionSummary { revision, added_at, program_version, origin } in listed {
         let origin = origin.as_ref().map_or(String::new(), |title| format!(", from {title}"));
         text += &format!("{revision}  {added_at}  by matdb {program_version}{origin}\n");
     }
