@@ -75,7 +75,7 @@ FROM material JOIN revision ON material_id = material.id AND number = current_re
 
 INSERT INTO entry SELECT * FROM entry_made;
 -- A material with damaged texts is left out of searches: it must not keep the file from being opened.
-INSERT INTO entry_tag SELECT DISTINCT slug, value
+INSERT OR IGNORE INTO entry_tag SELECT DISTINCT slug, value
 FROM material JOIN revision ON material_id = material.id AND number = current_revision
 JOIN json_each(CASE WHEN json_valid(tags) THEN tags ELSE '[]' END);
 INSERT INTO search (rowid, slug, name, class, tags, description, finish, unknown, sources)

@@ -134,4 +134,5 @@ SELECT slug, material.id AS material_id, number AS revision, name, class, status
     (SELECT count(*) FROM fit
      WHERE revision_id = revision.id AND curve IS NOT NULL AND estimator <> 'stated') AS fitted
 FROM material JOIN revision ON material_id = material.id AND number = current_revision;
-UPDATE entry SET fitted = (SELECT made.fitted FROM entry_made AS made WHERE made.slug = entry.slug);
+UPDATE entry SET fitted =
+    coalesce((SELECT made.fitted FROM entry_made AS made WHERE made.slug = entry.slug), fitted);

@@ -86,7 +86,7 @@ fn exhaustive(probe: &Probe, store: &Store, filter: &Filter, rank: Rank, most: u
     let far = |distance: &Distance| distance.rank_db(rank);
     found.sort_by(|a, b| far(&a.1).total_cmp(&far(&b.1)).then_with(|| a.0.cmp(&b.0)));
     found.truncate(most);
-    Nearest { found, left_out }
+    Nearest { found, left_out, damaged: Vec::new() }
 }
 
 /// A curve like that of some material, with scatter, repeats, and what lies below a threshold.

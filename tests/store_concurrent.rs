@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use crate::support::database::{child, contents, given, is_sound, sample};
-use matdb::store::{Addition, Store};
+use matdb::material::builtin;
+use matdb::store::{Addition, Filter, Store};
 
 const WRITERS: usize = 4;
 const MATERIALS: usize = 5;
@@ -34,6 +35,29 @@ fn threads_write_at_once() {
             }
         });
         check(&path);
+    }
+}
+
+#[test]
+fn what_another_program_writes_is_no_damage_to_a_reader() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("matdb.sqlite");
+    let [paint, glass] =
+        ["mannequin-paint", "glass"].map(|name| builtin::get(name).unwrap().unwrap());
+    Store::open(&path).unwrap().add([&paint]).unwrap();
+    let mut reader = Store::open(&path).unwrap();
+    for round in 0..20 {
+        let mut writer = Store::open(&path).unwrap();
+        if round % 2 == 0 {
+            writer.add([&glass]).unwrap();
+        } else {
+            writer.remove([&glass.slug]).unwrap();
+        }
+        drop(writer);
+        assert_eq!(reader.search("paint", 9).unwrap().len(), 1, "round {round}");
+        assert_eq!(reader.damage().unwrap(), Vec::<String>::new(), "round {round}");
+        assert_eq!(reader.find(&Filter::default()).unwrap().len(), 1 + (round + 1) % 2);
+        reader.add([&paint]).unwrap();
     }
 }
 

@@ -192,6 +192,88 @@ fn a_damaged_fit_does_not_close_a_file_of_an_older_schema() {
     }
 }
 
+/// Overwrites the root page of a table or an index of an older file.
+fn torn_page(path: &Path, of: &str) {
+    let conn = Connection::open(path).unwrap();
+    conn.pragma_update(None, "journal_mode", "delete").unwrap();
+    let sql = "SELECT rootpage FROM sqlite_schema WHERE name = ?1";
+    let page: usize = conn.query_row(sql, [of], |row| row.get::<_, u32>(0)).unwrap() as usize;
+    let size: u32 = conn.pragma_query_value(None, "page_size", |row| row.get(0)).unwrap();
+    drop(conn);
+    let size = size as usize;
+    let mut bytes = fs::read(path).unwrap();
+    bytes[(page - 1) * size..page * size].fill(0xa5);
+    fs::write(path, bytes).unwrap();
+}
+
+#[test]
+fn damaged_tables_and_indexes_do_not_close_a_file_of_an_older_schema() {
+    for of in ["curve_statistic", "sqlite_autoindex_curve_2", "activity", "origin", "session"] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("matdb.sqlite");
+        fs::copy(fixtures().join("schema-0014.sqlite"), &path).unwrap();
+        torn_page(&path, of);
+        let output = support::matdb(folder.path()).arg("list").output().unwrap();
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success() && text.contains("primer"), "{of}: {text}");
+        let output = support::matdb(folder.path()).arg("check").output().unwrap();
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert!(!output.status.success() && text.contains("paint@"), "{of}: {text}");
+    }
+}
+
+#[test]
+fn a_damaged_index_of_revisions_costs_a_file_of_an_older_schema_no_revision() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("matdb.sqlite");
+    fs::copy(fixtures().join("schema-0014.sqlite"), &path).unwrap();
+    let conn = Connection::open(&path).unwrap();
+    conn.pragma_update(None, "journal_mode", "delete").unwrap();
+    let sql = "SELECT rootpage FROM sqlite_schema WHERE name = 'sqlite_autoindex_revision_1'";
+    let page = conn.query_row(sql, [], |row| row.get::<_, u32>(0)).unwrap() as usize;
+    drop(conn);
+    // sqlite.org/fileformat.html: a leaf of an index without cells. Pages of the file have 1024 bytes.
+    let mut bytes = fs::read(&path).unwrap();
+    bytes[(page - 1) * 1024..][..8].copy_from_slice(&[0x0a, 0, 0, 0, 0, 4, 0, 0]);
+    fs::write(&path, bytes).unwrap();
+    support::refused(support::matdb(folder.path()).args(["show", "paint"]));
+    // Its fits are made up, and cannot be made again.
+    let _ = support::matdb(folder.path()).args(["check", "--repair"]).output().unwrap();
+    assert_eq!(contents(&path), held("schema-0014.sqlite"));
+}
+
+#[test]
+fn lost_rows_do_not_close_a_file_of_an_older_schema() {
+    for sql in [
+        "DELETE FROM revision WHERE id = 2",
+        "INSERT INTO effect VALUES (99, 0, 'x')",
+        "INSERT INTO effect_parameter VALUES (1, 'nosuch', 'a', 1.0)",
+        "DELETE FROM source WHERE revision_id = 2",
+        "UPDATE revision SET id = -1 WHERE id = 2",
+    ] {
+        for file in ["schema-0003.sqlite", "schema-0005.sqlite", "schema-0006.sqlite"] {
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("matdb.sqlite");
+            fs::copy(fixtures().join(file), &path).unwrap();
+            damaged_revision(&path, sql);
+            support::matdb(folder.path()).args(["show", "primer"]).assert().success();
+            let check = support::matdb(folder.path()).arg("check").output().unwrap();
+            let said = String::from_utf8_lossy(&check.stdout).into_owned();
+            assert!(!check.status.success() && said.contains("looked at"), "{file}, {sql}: {said}");
+        }
+    }
+}
+
+#[test]
+fn tables_of_others_with_passing_names_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("matdb.sqlite");
+    fs::copy(fixtures().join("schema-0006.sqlite"), &path).unwrap();
+    damaged_revision(&path, "CREATE TABLE kept (x)");
+    let message = support::refused(support::matdb(folder.path()).arg("list"));
+    assert!(message.contains("rename or remove the table `kept`"), "{message}");
+}
+
 /// Writes over what a row of `revision` of an older file holds, without the rules of its tables.
 fn damaged_revision(path: &Path, sql: &str) {
     let conn = Connection::open(path).unwrap();
@@ -204,6 +286,7 @@ fn damaged_revision(path: &Path, sql: &str) {
 fn a_damaged_revision_does_not_close_a_file_of_an_older_schema() {
     for (file, sql) in [
         ("schema-0001.sqlite", "UPDATE revision SET tags = 'gold' WHERE id = 2"),
+        ("schema-0001.sqlite", "UPDATE revision SET tags = '[null]' WHERE id = 2"),
         (
             "schema-0003.sqlite",
             "UPDATE revision SET description = CAST(x'ff' AS TEXT) WHERE id = 2",

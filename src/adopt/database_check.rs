@@ -53,9 +53,6 @@ pub struct CheckReport {
     pub copy: Option<PathBuf>,
     /// What is wrong, and what could not be repaired.
     pub findings: Vec<Problem>,
-    /// How many of the findings are tables, indexes, views and triggers that matdb has not made.
-    #[serde(skip)]
-    pub of_others: usize,
 }
 
 impl DatabaseCheck {
@@ -91,7 +88,7 @@ impl DatabaseCheck {
             return Err(Error::NoDatabase { path: database.path().to_owned() });
         };
         let file = database.path().display().to_string();
-        let revisions = store.lines()?.iter().map(|material| material.revision as usize).sum();
+        let revisions = store.revision_count().unwrap_or_default();
         progress(CheckProgress::Begin { revisions });
         let mut findings = Vec::new();
         for problem in repair.failed {
@@ -115,7 +112,10 @@ impl DatabaseCheck {
             Vec::new()
         });
         let mut notices = too_much(&store, &outlines, &mut unread);
-        notices.extend(store.lost_revisions().unwrap_or_default());
+        notices.extend(store.lost_revisions().unwrap_or_else(|error| {
+            unread(error);
+            Vec::new()
+        }));
         let is_of_surface = |line: &&OutlineEntry| line.lobes == Lobes::Surface;
         Ok(CheckReport {
             revisions,
@@ -125,7 +125,6 @@ impl DatabaseCheck {
             notices,
             repaired: repair.mended,
             copy: repair.copy,
-            of_others: store.added_objects().map_or(0, |added| added.len()),
             findings,
         })
     }

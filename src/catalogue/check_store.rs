@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::problem::{Problem, problem};
 use crate::fit::again::{lacks_report, problems};
-use crate::material::Fit;
+use crate::material::{Fit, Slug};
 use crate::store::{RowCheck, Store, StoreError, StoredRevision, Summary};
 
 /// How much was checked.
@@ -59,28 +59,47 @@ impl StoreCheck<'_> {
         mut each: impl FnMut(&Summary, &StoredRevision, &mut dyn FnMut(Problem)),
     ) -> CheckCount {
         let mut count = CheckCount::default();
-        let opened = self.check_file(store).and_then(|row_check| Ok((store.lines()?, row_check)));
-        let (summaries, mut row_check) = match opened {
-            Ok(opened) => opened,
-            Err(error) => {
-                (self.report)(problem("materials", error));
-                return count;
+        let checked = store.in_one_moment(|store| {
+            let mut row_check = self.check_file(store)?;
+            for name in store.names()? {
+                count.materials += 1;
+                let done = match name.parse() {
+                    Ok(slug) => {
+                        self.check_material(store, &mut row_check, &slug, &mut count, &mut each)
+                    }
+                    Err(error) => {
+                        (self.report)(problem(
+                            &name,
+                            format!("is not a name of a material: {error}"),
+                        ));
+                        Ok(())
+                    }
+                };
+                if let Err(error) = done {
+                    (self.report)(problem(&name, error));
+                }
             }
-        };
-        for summary in &summaries {
-            count.materials += 1;
-            let done = self.check_material(store, &mut row_check, summary, &mut count, &mut each);
-            if let Err(error) = done {
-                (self.report)(problem(summary.slug.as_str(), error));
-            }
+            Ok(())
+        });
+        if let Err(error) = checked.and_then(|checked| checked) {
+            (self.report)(problem("materials", error));
         }
         count
     }
 
     /// Checks pages, indexes, the schema and the table of units. Returns the check for the rows of revisions.
     fn check_file(&mut self, store: &Store) -> Result<RowCheck, StoreError> {
-        for problems in [store.damage()?, store.changed_schema()?, store.added_objects()?] {
-            problems.into_iter().for_each(|what| (self.report)(problem(self.name, what)));
+        // A table that is missing is reported first: it is the reason of other problems.
+        for problems in [store.changed_schema(), store.added_objects(), store.damage()] {
+            match problems {
+                Ok(problems) => {
+                    problems.into_iter().for_each(|what| (self.report)(problem(self.name, what)));
+                }
+                Err(StoreError::Corrupt { problem: what, .. }) => {
+                    (self.report)(problem(self.name, what))
+                }
+                Err(error) => return Err(error),
+            }
         }
         let row_check = RowCheck::new()?;
         if !row_check.has_own_units(store)? {
@@ -93,21 +112,27 @@ impl StoreCheck<'_> {
         &mut self,
         store: &Store,
         row_check: &mut RowCheck,
-        summary: &Summary,
+        slug: &Slug,
         count: &mut CheckCount,
         each: &mut impl FnMut(&Summary, &StoredRevision, &mut dyn FnMut(Problem)),
     ) -> Result<(), StoreError> {
-        let numbers = match store.revision_numbers(&summary.slug) {
+        let numbers = match store.revision_numbers(slug) {
             Err(StoreError::Corrupt { problem: what, .. }) => {
-                (self.report)(problem(summary.slug.as_str(), what));
+                (self.report)(problem(slug.as_str(), what));
                 return Ok(());
             }
             numbers => numbers?,
         };
+        let summary = match store.summary(slug) {
+            // A list that is damaged is found with the file.
+            Err(StoreError::Corrupt { .. }) => None,
+            summary => summary?,
+        };
+        let current = numbers.last().copied();
         for revision in numbers {
-            let place = format!("{}@{revision}", summary.slug);
+            let place = format!("{slug}@{revision}");
             // Reading recomputes the hash.
-            match store.get(&summary.slug, Some(revision)) {
+            match store.get(slug, Some(revision)) {
                 Ok(Some(stored)) => {
                     count.revisions += 1;
                     count.curves += stored.material.curves.len();
@@ -115,11 +140,11 @@ impl StoreCheck<'_> {
                         (self.report)(problem(place, error));
                     } else {
                         derived(row_check, store, &stored)?.into_iter().for_each(&mut *self.report);
-                        let is_current = revision == summary.revision;
+                        let is_current = Some(revision) == current;
                         if self.refit == Refit::All || self.refit == Refit::Current && is_current {
                             count.fits += check_fits(&stored, self.report);
                         }
-                        if is_current {
+                        if let Some(summary) = summary.as_ref().filter(|_| is_current) {
                             each(summary, &stored, self.report);
                         }
                     }

@@ -18,8 +18,10 @@ use crate::store::{Filter, OutlineEntry, Store, StoreError};
 pub struct Nearest {
     /// The nearest first; of equally near ones the first by name.
     pub found: Vec<(Slug, Distance)>,
-    /// How many have too little in common with the curve.
+    /// How many have too little in common with the curve, or are damaged.
     pub left_out: usize,
+    /// Names of the damaged ones.
+    pub damaged: Vec<String>,
 }
 
 impl Probe {
@@ -59,13 +61,15 @@ impl Probe {
             let slug = lines.get(place).and_then(|line| line.slug.parse::<Slug>().ok());
             found.extend(slug.map(|slug| (slug, distance)));
         }
-        Ok(Nearest { found, left_out })
+        let damaged = lines.into_iter().filter(|line| line.is_damaged).map(|line| line.slug);
+        Ok(Nearest { found, left_out, damaged: damaged.collect() })
     }
 
     /// A lower bound of the distance to a material, dB; none where the two cannot be compared.
     fn least_db(&self, line: &OutlineEntry, rank: Rank) -> Option<f64> {
         match (&line.model_hash, &line.outline) {
             (None, _) => None,
+            _ if line.is_damaged => None,
             // An outline is that of the surface and not of what a beam sees.
             _ if self.widens(line.lobes) => Some(f64::NEG_INFINITY),
             (_, None) => Some(f64::NEG_INFINITY),

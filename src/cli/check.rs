@@ -17,7 +17,7 @@ use crate::setup::Database;
 
 Verifies pages, hashes, values, statistics of curves, and fits. The status is 1 when anything is wrong.")]
 pub(super) struct Args {
-    /// First rebuild indexes, lists, statistics and damaged built-in materials; nothing sound changes
+    /// First copy the file and mend indexes, lists, statistics, records and built-in materials; nothing sound changes
     #[arg(long)]
     repair: bool,
 }
@@ -37,10 +37,8 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         0 => Ok(()),
         count => Err(Error::usage(
             format!("{} wrong in {file}", counted(count, "thing")),
-            if count == report.of_others {
-                "no repair removes what others have made; the lines above say how to"
-            } else if args.repair {
-                "add the damaged materials again, or restore the file from a copy"
+            if args.repair {
+                "add or remove the damaged materials, or restore the file from a copy"
             } else {
                 "`matdb check --repair` mends what can be"
             },

@@ -37,6 +37,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
 fn row(MaterialHit { hit, origin }: &MaterialHit) -> [String; 4] {
     let place = match *origin {
         "built-in" => "built in, not added".to_owned(),
+        _ if hit.is_damaged => "damaged".to_owned(),
         _ => with_status(&format!("revision {}", hit.revision), &hit.status),
     };
     let snippet = hit.snippet.split_whitespace().collect::<Vec<_>>().join(" ");

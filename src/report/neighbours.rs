@@ -140,9 +140,12 @@ impl NeighbourSearch {
         for (store, is_stored) in [(store, true), (Some(&built_in), false)] {
             let Some(store) = store else { continue };
             // One more than wanted: the material itself is left out.
-            let Nearest { found, left_out } =
+            let Nearest { found, left_out, damaged } =
                 probe.nearest(store, filter, rank, limit.saturating_add(1))?;
             report.left_out += left_out;
+            report.notices.extend(damaged.iter().map(|slug| {
+                format!("`{slug}` is damaged and is left out; `matdb check` lists all damage")
+            }));
             for (slug, distance) in found {
                 if self.own.as_ref() != Some(&slug) {
                     report.materials.extend(self.neighbour(store, &slug, is_stored, distance)?);

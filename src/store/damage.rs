@@ -4,12 +4,15 @@ use rusqlite::{Connection, Result};
 
 use super::error::{is_damage, reason};
 use super::find::stale::{problem, stale};
+use super::pages::renew_search;
 use super::read::not_latest;
-use super::rows::rows;
+use super::rows::{moment, rows};
 
 /// Every problem of a file as a sentence: damaged pages, references to missing rows, current revisions that are not the
 /// latest, and rows of lists and searches that differ from their material.
 pub(super) fn damage(conn: &Connection) -> Result<Vec<String>> {
+    let _moment = moment(conn)?;
+    renew_search(conn);
     let found = match rows(conn, "PRAGMA integrity_check", [], |row| row.get::<_, String>(0)) {
         // It evaluates the CHECK of every row, and a text that is not JSON ends it.
         Err(error) if is_damage(&error) => {
@@ -52,6 +55,6 @@ pub(super) fn lost_revisions(conn: &Connection) -> Result<Vec<String>> {
                HAVING count(*) < max(number) ORDER BY slug";
     rows(conn, sql, [], |row| {
         let (slug, left, latest): (String, u32, u32) = (row.get(0)?, row.get(1)?, row.get(2)?);
-        Ok(format!("of the {latest} revisions of `{slug}`, {left} are left"))
+        Ok(format!("`{slug}` has revisions up to {latest}, of which {left} are stored"))
     })
 }

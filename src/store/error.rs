@@ -103,6 +103,19 @@ pub enum StoreError {
         /// Name of the trigger.
         name: String,
     },
+    /// The number of its schema is wrong.
+    #[error(
+        "{} says that it has schema {said}, but its {object} is of a later one; bring the file back from a copy",
+        file.display()
+    )]
+    WrongSchema {
+        /// The file.
+        file: PathBuf,
+        /// The number that it says.
+        said: usize,
+        /// Kind and name of what is of a later schema.
+        object: String,
+    },
     /// The file is empty or not there, but its log is.
     #[error(
         "{} is empty or not there, but its log {} is; bring the file back from a copy, or move the log away to begin anew",
@@ -116,7 +129,7 @@ pub enum StoreError {
     },
     /// A log holds what was written last, and cannot be read without another file beside it.
     #[error(
-        "{} holds what was written last to {} and cannot be read where no file can be made beside it; copy both to a \
+        "{} holds what was written last to {} and cannot be read where no file can be made next to it; copy both to a \
          folder that you may write",
         log.display(), file.display()
     )]

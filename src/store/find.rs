@@ -7,13 +7,13 @@ mod words;
 
 use std::collections::BTreeMap;
 
-use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior};
+use rusqlite::{Connection, OptionalExtension};
 
 use super::database::Store;
 use super::error::{InFile, StoreError, is_damage};
 use super::read::{current_revision, damaged};
 use super::results::Summary;
-use super::rows::rows;
+use super::rows::{moment, rows};
 use crate::material::{Fit, Slug, SourceKind};
 use filter::summary;
 
@@ -24,14 +24,14 @@ pub use words::Match;
 impl Store {
     /// The current revisions of the materials that match a filter, sorted by name.
     ///
-    /// Up to 8 MiB, the lists of a database are compared with its materials first. Without a filter, a line that says
-    /// something else is marked as damaged; with one, it is an error, since the line may belong to other materials.
-    /// [`Store::damage`] compares databases of any size.
+    /// Up to 8 MiB, the lists of a database are compared with its materials first, and a line that says something else is
+    /// marked as damaged. [`Store::damage`] compares databases of any size.
     ///
     /// # Errors
-    /// When the file cannot be read, or a list leaves out a material.
+    /// When the file cannot be read, a list leaves out a material, or a list with a filter says something else of a
+    /// sound one: then the filter may be wrong about others, and [`Store::repair`] mends that.
     pub fn find(&self, filter: &Filter) -> Result<Vec<Summary>, StoreError> {
-        self.marked(filter, |conn| filter::all(conn, filter))
+        marked(&self.conn, filter, |conn| filter::all(conn, filter)).in_file(&self.path)
     }
 
     /// The first `most` materials that match a filter, sorted by name, as [`Store::find`] gives them. Does not read
@@ -40,30 +40,7 @@ impl Store {
     /// # Errors
     /// As [`Store::find`].
     pub fn page(&self, filter: &Filter, most: u32) -> Result<Vec<Summary>, StoreError> {
-        self.marked(filter, |conn| filter::page(conn, filter, most))
-    }
-
-    /// Lines of the list of a filter; those that are not what is stored are marked.
-    fn marked(
-        &self,
-        filter: &Filter,
-        read: impl FnOnce(&Connection) -> rusqlite::Result<Vec<Summary>>,
-    ) -> Result<Vec<Summary>, StoreError> {
-        let marked = || {
-            let tx = moment(&self.conn)?;
-            let stale = stale::stale_lines(&tx, filter)?;
-            let mut lines = read(&tx)?;
-            for line in &mut lines {
-                line.is_damaged = stale.iter().any(|slug| slug == line.slug.as_str());
-            }
-            Ok(lines)
-        };
-        marked().in_file(&self.path)
-    }
-
-    /// Every line of the lists as it is.
-    pub(crate) fn lines(&self) -> Result<Vec<Summary>, StoreError> {
-        filter::all(&self.conn, &Filter::default()).in_file(&self.path)
+        marked(&self.conn, filter, |conn| filter::page(conn, filter, most)).in_file(&self.path)
     }
 
     /// Number of materials that match a filter, at most `most`. Does not count the others.
@@ -125,6 +102,15 @@ impl Store {
         Ok(words)
     }
 
+    /// Outlines of the materials that match a filter, sorted by name.
+    ///
+    /// # Errors
+    /// When the file cannot be read; where a list or an outline is not that of what is stored, which is compared up to
+    /// 8 MiB.
+    pub fn outlines(&self, filter: &Filter) -> Result<Vec<OutlineEntry>, StoreError> {
+        outlined(&self.conn, filter).in_file(&self.path)
+    }
+
     /// The `most` materials that all these words are found in, the best first; the last word may be the
     /// beginning of one. Names count most, then tags and class, then all else. Words are only words,
     /// whatever signs are in them; without a letter or digit nothing is found.
@@ -136,26 +122,53 @@ impl Store {
     /// When the file cannot be read; where the index of texts is not that of what is stored, which is compared up to
     /// 8 MiB.
     pub fn search(&self, words: &str, most: u32) -> Result<Vec<Match>, StoreError> {
-        let found = || {
-            let tx = moment(&self.conn)?;
-            stale::check_texts(&tx)?;
-            words::search(&tx, words, most)
-        };
-        found().in_file(&self.path)
+        searched(&self.conn, words, most).in_file(&self.path)
     }
 }
 
-/// A transaction in which another program's writes are not seen.
-pub(super) fn moment(conn: &Connection) -> rusqlite::Result<Transaction<'_>> {
-    Transaction::new_unchecked(conn, TransactionBehavior::Deferred)
+/// Lines of the list of a filter; those that are not what is stored are marked.
+fn marked(
+    conn: &Connection,
+    filter: &Filter,
+    read: impl FnOnce(&Connection) -> rusqlite::Result<Vec<Summary>>,
+) -> rusqlite::Result<Vec<Summary>> {
+    let _moment = moment(conn)?;
+    let stale = stale::stale_lines(conn, filter)?;
+    let mut lines = read(conn)?;
+    for line in &mut lines {
+        line.is_damaged = stale.iter().any(|slug| slug == line.slug.as_str());
+    }
+    Ok(lines)
+}
+
+/// Materials with all these words; damaged ones are marked.
+fn searched(conn: &Connection, words: &str, most: u32) -> rusqlite::Result<Vec<Match>> {
+    let _moment = moment(conn)?;
+    let stale = stale::stale_texts(conn)?;
+    let mut hits = words::search(conn, words, most)?;
+    for hit in &mut hits {
+        hit.is_damaged = stale.iter().any(|slug| slug == hit.slug.as_str());
+    }
+    Ok(hits)
+}
+
+/// Outlines of the materials of a filter; damaged ones are marked.
+fn outlined(conn: &Connection, filter: &Filter) -> rusqlite::Result<Vec<OutlineEntry>> {
+    let _moment = moment(conn)?;
+    let stale = stale::stale_outlines(conn, filter)?;
+    let mut lines = outline::all(conn, filter)?;
+    for line in &mut lines {
+        line.is_damaged = stale.contains(&line.slug);
+    }
+    Ok(lines)
 }
 
 fn one(conn: &Connection, slug: &Slug) -> rusqlite::Result<Option<Summary>> {
     let sql = "SELECT slug, name, class, revision, kind, status, curves, observations, fits
                FROM entry WHERE slug = ?1";
-    let tx = moment(conn)?;
-    let found = tx.prepare_cached(sql)?.query_row([slug.as_str()], summary).optional()?;
-    if found.is_none() && current_revision(&tx, slug)?.is_some() {
+    let _moment = moment(conn)?;
+    let found = conn.prepare_cached(sql)?.query_row([slug.as_str()], summary).optional()?;
+    if found.is_none() && current_revision(conn, slug)?.is_some() {
         return Err(damaged(format!("`{slug}` is there, but no list knows it")));
     }
     Ok(found)

@@ -22,6 +22,7 @@ mod database;
 mod edit;
 mod error;
 mod find;
+mod latest;
 mod law;
 mod open;
 mod own_schema;

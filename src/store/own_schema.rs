@@ -3,7 +3,8 @@
 use super::connect;
 use super::database::Store;
 use super::error::{InFile, StoreError};
-use super::tables::schema;
+use super::rows::rows;
+use super::tables::{quoted, schema};
 
 impl Store {
     /// Whether tables, indexes, views and triggers are exactly those of this program. A file from elsewhere could have
@@ -32,7 +33,15 @@ impl Store {
     /// When the file cannot be read.
     pub fn added_objects(&self) -> Result<Vec<String>, StoreError> {
         let [own, there] = self.schemas()?;
-        let is_added = |one: &&[Option<String>; 4]| !own.iter().any(|own| own[..2] == one[..2]);
+        let sql = "SELECT name FROM pragma_table_list WHERE type = 'shadow'";
+        let shadows: Vec<Option<String>> =
+            rows(&self.conn, sql, [], |row| row.get(0)).in_file(&self.path)?;
+        let is_added = |one: &&[Option<String>; 4]| {
+            // What has no statement, and what belongs to a full-text index, goes with its table.
+            !own.iter().any(|own| own[..2] == one[..2])
+                && one[3].is_some()
+                && !shadows.contains(&one[1])
+        };
         let added = there.iter().filter(is_added);
         Ok(added
             .map(|one| format!("{0} was not made by matdb: DROP {0} removes it", named(one)))
@@ -48,5 +57,8 @@ impl Store {
 
 /// Kind and name of an object of a schema.
 fn named([kind, name, ..]: &[Option<String>; 4]) -> String {
-    format!("{} {}", kind.as_deref().unwrap_or_default(), name.as_deref().unwrap_or_default())
+    let name = name.as_deref().unwrap_or_default();
+    let is_plain = name.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
+    let name = if is_plain { name.to_owned() } else { quoted(name) };
+    format!("{} {name}", kind.as_deref().unwrap_or_default())
 }

@@ -1,10 +1,13 @@
 //! Reads materials by their names.
 
+use rusqlite::Connection;
+
 use super::database::Store;
 use super::error::{InFile, StoreError};
-use super::find::{Filter, moment};
+use super::find::Filter;
 use super::results::{RevisionSummary, StoredRevision, Summary};
-use super::{damage, read};
+use super::rows::moment;
+use super::{damage, read, record};
 use crate::brdf::Brdf;
 use crate::material::Slug;
 use crate::measure::AngleStatistics;
@@ -36,7 +39,7 @@ impl Store {
         slug: &Slug,
         revision: Option<u32>,
     ) -> Result<Option<StoredRevision>, StoreError> {
-        let stored = read::get(&self.conn, slug, revision).in_file(&self.path)?;
+        let stored = stored(&self.conn, slug, revision).in_file(&self.path)?;
         match stored {
             Some(stored) if stored.material.content_hash() != stored.content_hash => {
                 let problem =
@@ -73,8 +76,7 @@ impl Store {
     }
 
     /// Statistics by angle of a curve of one revision, or of the current one, computed when it was added. Empty when
-    /// the curve or the revision does not exist, has no backscatter or has points above the instrument's range, or
-    /// when an older program stored it.
+    /// the curve or the revision does not exist, has no backscatter or has points above the instrument's range.
     ///
     /// # Errors
     /// When the file cannot be read.
@@ -93,17 +95,29 @@ impl Store {
     /// # Errors
     /// When the file cannot be read.
     pub fn damage(&self) -> Result<Vec<String>, StoreError> {
-        // One transaction: another program may write meanwhile.
-        moment(&self.conn).and_then(|tx| damage::damage(&tx)).in_file(&self.path)
+        damage::damage(&self.conn).in_file(&self.path)
     }
 
-    /// How many revisions each material has that has lost earlier ones, as a sentence each. A repair leaves such gaps
+    /// Every material with fewer revisions than the greatest number says, as a sentence each. A repair leaves such gaps
     /// where it cannot bring a revision back.
-    ///
-    /// # Errors
-    /// When the file cannot be read.
-    pub fn lost_revisions(&self) -> Result<Vec<String>, StoreError> {
+    pub(crate) fn lost_revisions(&self) -> Result<Vec<String>, StoreError> {
         damage::lost_revisions(&self.conn).in_file(&self.path)
+    }
+
+    /// Reads in one moment: writes of other programs are not seen.
+    pub(crate) fn in_one_moment<T>(&self, read: impl FnOnce(&Store) -> T) -> Result<T, StoreError> {
+        let _moment = moment(&self.conn).in_file(&self.path)?;
+        Ok(read(self))
+    }
+
+    /// Names of all materials as they are, sound or damaged.
+    pub(crate) fn names(&self) -> Result<Vec<String>, StoreError> {
+        read::names(&self.conn).in_file(&self.path)
+    }
+
+    /// Number of all revisions.
+    pub(crate) fn revision_count(&self) -> Result<usize, StoreError> {
+        read::revision_count(&self.conn).in_file(&self.path)
     }
 
     /// Whether a material of that name exists, sound or damaged, in the lists alone too.
@@ -129,6 +143,28 @@ impl Store {
     /// When the file cannot be read, a material has no revision, or a revision another number, date, program, command
     /// or origin than was stored.
     pub fn history(&self, slug: &Slug) -> Result<Vec<RevisionSummary>, StoreError> {
-        read::history(&self.conn, slug).in_file(&self.path)
+        history(&self.conn, slug).in_file(&self.path)
     }
+}
+
+/// A revision, of which the record is as it was stored.
+fn stored(
+    conn: &Connection,
+    slug: &Slug,
+    number: Option<u32>,
+) -> rusqlite::Result<Option<StoredRevision>> {
+    let _moment = moment(conn)?;
+    let Some((id, stored)) = read::found(conn, slug, number)? else { return Ok(None) };
+    record::check(conn, id, slug, stored.revision)?;
+    Ok(Some(stored))
+}
+
+/// Every revision, of which the records are as they were stored.
+fn history(conn: &Connection, slug: &Slug) -> rusqlite::Result<Vec<RevisionSummary>> {
+    let _moment = moment(conn)?;
+    let found = read::history(conn, slug)?;
+    for (id, summary) in &found {
+        record::check(conn, *id, slug, summary.revision)?;
+    }
+    Ok(found.into_iter().map(|(_, summary)| summary).collect())
 }

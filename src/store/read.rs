@@ -6,13 +6,11 @@ pub(super) use provenance::{command, origin, statistics};
 
 use rusqlite::ffi;
 use rusqlite::types::Type;
-use rusqlite::{
-    Connection, Error, OptionalExtension, Result, Row, Transaction, TransactionBehavior, params,
-};
+use rusqlite::{Connection, Error, OptionalExtension, Result, Row, params};
 
+use super::law;
 use super::results::{RevisionSummary, StoredRevision};
-use super::rows::{json, optional_json, rows};
-use super::{law, record};
+use super::rows::{json, moment, optional_json, rows};
 use crate::brdf::Brdf;
 use crate::formats::EffectEntry;
 use crate::material::{
@@ -24,23 +22,22 @@ use crate::radar::Footprint;
 pub(super) fn revision_numbers(conn: &Connection, slug: &Slug) -> Result<Vec<u32>> {
     let sql = "SELECT number FROM material JOIN revision ON material_id = material.id
                WHERE slug = ?1 ORDER BY number";
-    let tx = Transaction::new_unchecked(conn, TransactionBehavior::Deferred)?;
-    let numbers: Vec<u32> = rows(&tx, sql, [slug.as_str()], |row| row.get(0))?;
+    let _moment = moment(conn)?;
+    let numbers: Vec<u32> = rows(conn, sql, [slug.as_str()], |row| row.get(0))?;
     if numbers.is_empty() {
-        check_absent(&tx, slug)?;
+        check_absent(conn, slug)?;
     }
     Ok(numbers)
 }
 
-/// Every revision of a material, oldest first.
-pub(super) fn history(conn: &Connection, slug: &Slug) -> Result<Vec<RevisionSummary>> {
+/// Every revision of a material with the number of its row, oldest first, within a transaction.
+pub(super) fn history(conn: &Connection, slug: &Slug) -> Result<Vec<(i64, RevisionSummary)>> {
     let sql = "SELECT number, revision.added_at, revision.program_version, origin.revision_id, origin.title,
                    revision.id
                FROM material JOIN revision ON material_id = material.id
                LEFT JOIN origin ON origin.revision_id = revision.id
                WHERE slug = ?1 ORDER BY number";
-    let tx = Transaction::new_unchecked(conn, TransactionBehavior::Deferred)?;
-    let found: Vec<(i64, RevisionSummary)> = rows(&tx, sql, [slug.as_str()], |row| {
+    let found: Vec<(i64, RevisionSummary)> = rows(conn, sql, [slug.as_str()], |row| {
         let (of, title): (Option<i64>, Option<String>) = (row.get(3)?, row.get(4)?);
         let origin = of.map(|_| Origin { title, ..Origin::default() }.title().to_owned());
         let summary = RevisionSummary {
@@ -51,13 +48,25 @@ pub(super) fn history(conn: &Connection, slug: &Slug) -> Result<Vec<RevisionSumm
         };
         Ok((row.get(5)?, summary))
     })?;
-    if found.is_empty() {
-        check_absent(&tx, slug)?;
+    match current_revision(conn, slug)? {
+        Some(current) if !found.iter().any(|(_, summary)| summary.revision == current) => {
+            Err(missing(slug, current))
+        }
+        _ => Ok(found),
     }
-    for (id, summary) in &found {
-        record::check(&tx, *id, slug, summary.revision)?;
-    }
-    Ok(found.into_iter().map(|(_, summary)| summary).collect())
+}
+
+/// Names of all materials, sorted.
+pub(super) fn names(conn: &Connection) -> Result<Vec<String>> {
+    // A damaged name need not be text.
+    let sql = "SELECT CAST(slug AS BLOB) FROM material NOT INDEXED ORDER BY slug";
+    rows(conn, sql, [], |row| Ok(String::from_utf8_lossy(&row.get::<_, Vec<u8>>(0)?).into_owned()))
+}
+
+/// Number of all revisions.
+pub(super) fn revision_count(conn: &Connection) -> Result<usize> {
+    conn.query_row("SELECT count(*) FROM revision", [], |row| row.get::<_, u32>(0))
+        .map(|count| count as usize)
 }
 
 /// Number of the current revision of a material. Scans the table, so that a damaged index cannot hide it. `None` when
@@ -134,30 +143,17 @@ pub(super) fn licences(conn: &Connection) -> Result<Vec<String>> {
     rows(conn, sql, [], |row| row.get(0))
 }
 
-/// One revision of a material, or the current one.
-pub(super) fn get(
-    conn: &Connection,
-    slug: &Slug,
-    number: Option<u32>,
-) -> Result<Option<StoredRevision>> {
-    // One transaction: another program may write meanwhile.
-    let tx = Transaction::new_unchecked(conn, TransactionBehavior::Deferred)?;
-    let Some((revision_id, stored)) = found_in(&tx, slug, number)? else { return Ok(None) };
-    record::check(&tx, revision_id, slug, stored.revision)?;
-    Ok(Some(stored))
-}
-
 /// Reads one revision of a material, or the current one, within a transaction. Its record is not compared.
 pub(super) fn get_in(
     conn: &Connection,
     slug: &Slug,
     number: Option<u32>,
 ) -> Result<Option<StoredRevision>> {
-    Ok(found_in(conn, slug, number)?.map(|(_, stored)| stored))
+    Ok(found(conn, slug, number)?.map(|(_, stored)| stored))
 }
 
-/// As [`get_in`], with its number in the file.
-fn found_in(
+/// As [`get_in`], with the number of its row.
+pub(super) fn found(
     conn: &Connection,
     slug: &Slug,
     number: Option<u32>,
@@ -197,10 +193,10 @@ pub(super) struct Rendered {
 
 /// The model that scenes render of the current revision, and its range of angles, rad.
 pub(super) fn rendered(conn: &Connection, slug: &Slug) -> Result<Option<(Brdf, [f64; 2])>> {
-    let tx = Transaction::new_unchecked(conn, TransactionBehavior::Deferred)?;
-    let found = rendered_in(&tx, slug)?;
+    let _moment = moment(conn)?;
+    let found = rendered_in(conn, slug)?;
     if found.is_none() {
-        check_absent(&tx, slug)?;
+        check_absent(conn, slug)?;
     }
     Ok(found.and_then(|found| Some((found.model?, found.theta_rad))))
 }

@@ -1,15 +1,13 @@
 //! The record of a revision: what the hash of its content does not cover. It has four parts with a hash each, so that
 //! damage of one part leaves the others.
 
-use rusqlite::{Connection, OptionalExtension, Result, Transaction, params};
+use rusqlite::{Connection, Error, OptionalExtension, Result, Row, Transaction, params};
 use serde::Serialize;
 
 use super::error::is_damage;
 use super::read::{command, damaged, origin};
 use super::rows::rows;
-use super::tables::MAKING;
-use super::write::Rows;
-use crate::material::{Activity, Slug};
+use crate::material::Slug;
 
 /// A part of a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,26 +37,30 @@ impl Part {
 
     /// Hash of the part as it is. New fields must leave the JSON of older values as it is: files have its hash.
     fn hash(self, conn: &Connection, revision_id: i64) -> Result<String> {
-        match self {
+        let hash = match self {
             Part::Number => {
                 let sql = "SELECT slug, number, content_hash
                            FROM revision JOIN material ON material.id = material_id
                            WHERE revision.id = ?1";
-                let read = |row: &rusqlite::Row| -> Result<(String, u32, String)> {
+                let read = |row: &Row| -> Result<(String, u32, String)> {
                     Ok((row.get(0)?, row.get(1)?, row.get(2)?))
                 };
-                Ok(hash_of(&conn.prepare_cached(sql)?.query_row([revision_id], read)?))
+                conn.prepare_cached(sql)?.query_row([revision_id], read).map(|row| hash_of(&row))
             }
             Part::Date => {
                 let sql = "SELECT added_at, program_version FROM revision WHERE id = ?1";
-                let read = |row: &rusqlite::Row| -> Result<(String, String)> {
-                    Ok((row.get(0)?, row.get(1)?))
-                };
-                Ok(hash_of(&conn.prepare_cached(sql)?.query_row([revision_id], read)?))
+                let read =
+                    |row: &Row| -> Result<(String, String)> { Ok((row.get(0)?, row.get(1)?)) };
+                conn.prepare_cached(sql)?.query_row([revision_id], read).map(|row| hash_of(&row))
             }
             Part::Command => command(conn, revision_id).map(|made| hash_of(&made)),
             Part::Origin => origin(conn, revision_id).map(|made| hash_of(&made)),
-        }
+        };
+        hash.map_err(|error| match error {
+            // An index has a revision that is not there.
+            Error::QueryReturnedNoRows => damaged("the row of a revision is not there".to_owned()),
+            error => error,
+        })
     }
 }
 
@@ -68,33 +70,53 @@ fn hash_of(value: &impl Serialize) -> String {
     blake3::hash(&serde_json::to_vec(value).unwrap_or_default()).to_hex().to_string()
 }
 
-/// The parts that are not as they were stored.
-pub(super) fn changed(conn: &Connection, revision_id: i64) -> Result<Vec<Part>> {
+/// The parts that are not as they were stored, of what is called this revision of this material.
+pub(super) fn changed(
+    conn: &Connection,
+    revision_id: i64,
+    slug: &Slug,
+    number: u32,
+) -> Result<Vec<Part>> {
     let sql = "SELECT number_hash, date_hash, command_hash, origin_hash FROM record
                WHERE revision_id = ?1";
-    let read = |row: &rusqlite::Row| -> Result<[Option<String>; 4]> {
+    let read = |row: &Row| -> Result<[Option<String>; 4]> {
         Ok([row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?])
     };
     let stored = conn.prepare_cached(sql)?.query_row([revision_id], read).optional()?;
     let mut changed = Vec::new();
     for (part, stored) in PARTS.into_iter().zip(stored.unwrap_or_default()) {
-        match part.hash(conn, revision_id) {
+        let now = part.hash(conn, revision_id);
+        match now {
             Ok(now) if stored.as_ref() == Some(&now) => {}
             Err(error) if !is_damage(&error) => return Err(error),
             _ => changed.push(part),
         }
     }
+    // An index may have this name and number for the row of another revision.
+    let sql =
+        "SELECT slug = ?2 AND number = ?3 FROM revision JOIN material ON material.id = material_id
+               WHERE revision.id = ?1";
+    let values = params![revision_id, slug.as_str(), number];
+    let is_named = conn.prepare_cached(sql)?.query_row(values, |row| row.get(0)).optional()?;
+    if is_named != Some(true) && !changed.contains(&Part::Number) {
+        changed.insert(0, Part::Number);
+    }
     Ok(changed)
 }
 
 /// Whether a revision has the name, number and content hash with which it was stored.
-pub(super) fn has_its_number(conn: &Connection, revision_id: i64) -> Result<bool> {
-    Ok(!changed(conn, revision_id)?.contains(&Part::Number))
+pub(super) fn has_its_number(
+    conn: &Connection,
+    revision_id: i64,
+    slug: &Slug,
+    number: u32,
+) -> Result<bool> {
+    Ok(!changed(conn, revision_id, slug, number)?.contains(&Part::Number))
 }
 
 /// Fails where the record of a revision is not what was stored.
 pub(super) fn check(conn: &Connection, revision_id: i64, slug: &Slug, number: u32) -> Result<()> {
-    match changed(conn, revision_id)?.as_slice() {
+    match changed(conn, revision_id, slug, number)?.as_slice() {
         [] => Ok(()),
         changed => Err(damaged(format!(
             "revision {number} of `{slug}` has another {} than was stored",
@@ -130,67 +152,25 @@ fn write_parts(tx: &Transaction, revision_id: i64, parts: &[Part]) -> Result<()>
     tx.prepare_cached(sql)?.execute(values).map(|_| ())
 }
 
-/// Stores the hashes of all records, for a file from an older program. A number gets one where nothing contradicts it:
-/// it is not above that of the current revision, and later revisions have greater numbers. Of revisions on damaged
-/// pages, `torn`, nothing but the number is read.
+/// Stores the hashes of all records, for a file from an older program. Numbers get one where nothing contradicts them:
+/// they are not above that of the current revision, and rise from one revision of the material to the next. Of revisions
+/// on damaged pages, `torn`, nothing but the number is read.
 pub(super) fn fill(tx: &Transaction, torn: &[i64]) -> Result<()> {
-    let sql = "
-        SELECT own.id, own.number <= current_revision AND NOT EXISTS (
-            SELECT 1 FROM revision AS other
-            WHERE other.material_id = own.material_id AND other.number <= current_revision
-            AND (other.id < own.id) <> (other.number < own.number) AND other.id <> own.id)
-        FROM revision AS own JOIN material ON material.id = own.material_id
-        WHERE own.id NOT IN (SELECT revision_id FROM record)";
-    let revisions: Vec<(i64, bool)> = rows(tx, sql, [], |row| Ok((row.get(0)?, row.get(1)?)))?;
-    for (revision_id, has_number) in revisions {
-        let first = usize::from(!has_number);
-        let end = if torn.contains(&revision_id) { 1 } else { PARTS.len() };
-        write_parts(tx, revision_id, PARTS.get(first..end).unwrap_or_default())?;
+    // Without an index: a damaged one hides revisions, or has some that are not there.
+    let sql = "SELECT material_id, revision.id, number, current_revision
+               FROM revision NOT INDEXED JOIN material ON material.id = material_id
+               WHERE revision.id NOT IN (SELECT revision_id FROM record)
+               ORDER BY material_id, revision.id";
+    let revisions: Vec<(i64, i64, u32, u32)> =
+        rows(tx, sql, [], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?)))?;
+    for of_one in revisions.chunk_by(|a, b| a.0 == b.0) {
+        let numbers = of_one.iter().filter(|(_, _, number, current)| number <= current);
+        let is_rising = numbers.is_sorted_by(|(_, _, a, _), (_, _, b, _)| a < b);
+        for (_, revision_id, number, current) in of_one {
+            let first = usize::from(!(is_rising && number <= current));
+            let end = if torn.contains(revision_id) { 1 } else { PARTS.len() };
+            write_parts(tx, *revision_id, PARTS.get(first..end).unwrap_or_default())?;
+        }
     }
     Ok(())
-}
-
-/// Replaces the damaged parts of a record: the command and the origin by those of `by`, the date and the program by
-/// today's. Returns the parts.
-///
-/// Fails where the revision has another name or number than was stored: then it must not be taken for what it is
-/// called.
-pub(super) fn restore(
-    tx: &Transaction,
-    revision_id: i64,
-    by: Option<&Activity>,
-) -> Result<Vec<Part>> {
-    let changed = changed(tx, revision_id)?;
-    if changed.contains(&Part::Number) {
-        return Err(damaged("it has another name or number than was stored".to_owned()));
-    }
-    if changed.is_empty() {
-        return Ok(changed);
-    }
-    let made = if changed.contains(&Part::Command) {
-        by.map(|by| (by.command.clone(), by.inputs.clone()))
-    } else {
-        command(tx, revision_id)?
-    };
-    let from = if changed.contains(&Part::Origin) {
-        by.and_then(|by| by.origin.clone())
-    } else {
-        origin(tx, revision_id)?
-    };
-    for table in MAKING.iter().rev() {
-        tx.execute(&format!("DELETE FROM {table} WHERE revision_id = ?1"), [revision_id])?;
-    }
-    // An origin belongs to a command.
-    let made = made.or_else(|| from.is_some().then(|| ("add".to_owned(), Vec::new())));
-    if let Some((command, inputs)) = made {
-        Rows { tx, revision_id }.activity(&Activity { command, inputs, origin: from })?;
-    }
-    if changed.contains(&Part::Date) {
-        let sql = "UPDATE revision SET program_version = ?2,
-                       added_at = coalesce(strftime('%Y-%m-%dT%H:%M:%SZ', 'now'), '9999-12-31T23:59:59Z')
-                   WHERE id = ?1";
-        tx.execute(sql, params![revision_id, env!("CARGO_PKG_VERSION")])?;
-    }
-    write(tx, revision_id)?;
-    Ok(changed)
 }

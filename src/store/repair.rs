@@ -2,17 +2,18 @@
 
 use std::path::{Path, PathBuf};
 
-use rusqlite::{Result, Transaction, params};
+use rusqlite::{Connection, Result, Transaction, params};
 
 use super::damage::damage;
 use super::database::Store;
-use super::error::{InFile, StoreError, reason};
+use super::error::{InFile, StoreError, is_damage, reason};
+use super::find::stale::stale;
 use super::read::RevisionRow;
 use super::record::{self, Part};
 use super::results::StoredRevision;
 use super::row_check::RowCheck;
 use super::rows::rows;
-use super::tables::{schema, unit_rows};
+use super::tables::{own_tables, quoted, schema, unit_rows};
 use super::{connect, law, read, unreachable, write};
 use crate::brdf::Brdf;
 use crate::material::{Activity, Input, Material, Origin, Slug};
@@ -51,16 +52,29 @@ impl Store {
     pub fn repair(&mut self, at_hand: &[Material]) -> std::result::Result<Repair, StoreError> {
         let mut row_check = RowCheck::new()?;
         let Store { conn, path, .. } = self;
-        let tx = conn.transaction().in_file(path)?;
-        let mut repair = repair(&tx, &mut row_check, at_hand).in_file(path)?;
-        if !repair.mended.is_empty() && tx.path().is_some_and(|name| !name.is_empty()) {
-            let copy = copy_name(path)?;
-            connect::back_up(path, &copy)?;
-            repair.copy = Some(copy);
-        }
-        tx.commit().in_file(path)?;
-        Ok(repair)
+        // Rows of others may refer to those that are written anew, and would be removed with them.
+        conn.pragma_update(None, "foreign_keys", false).in_file(path)?;
+        let repaired = repair_with_copy(conn, path, &mut row_check, at_hand);
+        conn.pragma_update(None, "foreign_keys", true).in_file(path)?;
+        repaired
     }
+}
+
+fn repair_with_copy(
+    conn: &mut Connection,
+    path: &Path,
+    row_check: &mut RowCheck,
+    at_hand: &[Material],
+) -> std::result::Result<Repair, StoreError> {
+    let tx = conn.transaction().in_file(path)?;
+    let mut repair = repair(&tx, row_check, at_hand).in_file(path)?;
+    if !repair.mended.is_empty() && tx.path().is_some_and(|name| !name.is_empty()) {
+        let copy = copy_name(path)?;
+        connect::back_up(path, &copy)?;
+        repair.copy = Some(copy);
+    }
+    tx.commit().in_file(path)?;
+    Ok(repair)
 }
 
 /// A free name for a copy.
@@ -78,13 +92,14 @@ fn copy_name(path: &Path) -> std::result::Result<PathBuf, StoreError> {
 }
 
 fn repair(tx: &Transaction, row_check: &mut RowCheck, at_hand: &[Material]) -> Result<Repair> {
-    tx.pragma_update(None, "defer_foreign_keys", true)?;
-    let before = damage(tx)?;
+    // A table or a view may be missing.
+    let before = readable(damage(tx))?;
+    let is_sound = before.as_ref().is_some_and(Vec::is_empty);
     let mut repair = Repair::default();
-    let sound = if before.is_empty() { Vec::new() } else { sound_revisions(tx) };
+    let sound = if is_sound { Vec::new() } else { sound_revisions(tx)? };
     let at_hand: Vec<&Material> = at_hand.iter().chain(&sound).collect();
     repair.attempt(tx, "tables, indexes and views", || own_schema(tx, row_check))?;
-    repair.attempt(tx, "indexes", || tx.execute_batch("REINDEX").map(|()| Vec::new()))?;
+    repair.attempt(tx, "indexes", || indexes(tx))?;
     repair.attempt(tx, "units of columns", || units(tx, row_check))?;
     for renamed in renamed_materials(tx)? {
         repair.attempt(tx, &renamed.slug, || renamed_material(tx, &renamed))?;
@@ -93,6 +108,8 @@ fn repair(tx: &Transaction, row_check: &mut RowCheck, at_hand: &[Material]) -> R
         repair.attempt(tx, &lost.slug, || lost_material(tx, &lost))?;
     }
     repair.attempt(tx, "lists", || unreachable_lines(tx))?;
+    // A new revision could take the number of a lost one.
+    repair.attempt(tx, "rows of no material", || unreachable_rows(tx))?;
     let mut slugs = Vec::new();
     let named: Vec<String> = rows(tx, "SELECT slug FROM material", [], |row| row.get(0))?;
     for name in named {
@@ -102,7 +119,7 @@ fn repair(tx: &Transaction, row_check: &mut RowCheck, at_hand: &[Material]) -> R
         }
     }
     for slug in &slugs {
-        for row in read::revision_rows(tx, slug).unwrap_or_default() {
+        for row in readable(read::revision_rows(tx, slug))?.unwrap_or_default() {
             let place = format!("{slug}@{}", row.number);
             repair.attempt(tx, &place, || revision(tx, row_check, slug, &row, &at_hand))?;
             repair.attempt(tx, &place, || record_of(tx, slug, &row))?;
@@ -111,11 +128,19 @@ fn repair(tx: &Transaction, row_check: &mut RowCheck, at_hand: &[Material]) -> R
         repair.attempt(tx, slug.as_str(), || lost_current_revision(tx, slug))?;
     }
     repair.attempt(tx, "lists and searches", || lists(tx, &slugs))?;
-    repair.attempt(tx, "rows of no material", || unreachable_rows(tx))?;
-    if repair.mended.is_empty() && damage(tx)? != before {
-        repair.mended.push("indexes, lists and searches were made anew".to_owned());
+    if repair.mended.is_empty() && Some(damage(tx)?) != before {
+        repair.mended.push("indexes and searches were made anew".to_owned());
     }
     Ok(repair)
+}
+
+/// Makes the indexes of the tables of matdb anew.
+fn indexes(tx: &Transaction) -> Result<Vec<String>> {
+    for table in own_tables(tx)? {
+        tx.execute_batch(&format!("REINDEX {}", quoted(&table.name)))?;
+    }
+    tx.execute_batch("REINDEX outline")?;
+    Ok(Vec::new())
 }
 
 /// Removes rows that belong to no material.
@@ -152,11 +177,16 @@ impl Repair {
 
 /// Creates missing tables, and indexes, views and triggers that are missing or different. Existing tables stay.
 fn own_schema(tx: &Transaction, row_check: &RowCheck) -> Result<Vec<String>> {
-    let there = schema(tx)?;
+    let mut there = schema(tx)?;
     let mut own = schema(row_check.scratch())?;
     // An index needs its table.
     own.sort_by_key(|[kind, ..]| kind.as_deref() != Some("table"));
     let mut mended = Vec::new();
+    // The full-text index is made with all its tables or not at all.
+    if own.iter().any(|object| is_of_search(object) && !there.contains(object)) {
+        tx.execute_batch("DROP TABLE IF EXISTS search")?;
+        there.retain(|object| object[1].as_deref() != Some("search"));
+    }
     for object in own {
         let [Some(kind), Some(name), _, Some(sql)] = &object else { continue };
         // The full-text index creates its own tables.
@@ -174,6 +204,12 @@ fn own_schema(tx: &Transaction, row_check: &RowCheck) -> Result<Vec<String>> {
     Ok(mended)
 }
 
+/// Whether it is a table of the full-text index.
+fn is_of_search([kind, name, ..]: &[Option<String>; 4]) -> bool {
+    kind.as_deref() == Some("table")
+        && name.as_ref().is_some_and(|name| name.starts_with("search_"))
+}
+
 /// Rewrites the units of columns where they differ.
 fn units(tx: &Transaction, row_check: &RowCheck) -> Result<Vec<String>> {
     let own = unit_rows(row_check.scratch())?;
@@ -187,19 +223,28 @@ fn units(tx: &Transaction, row_check: &RowCheck) -> Result<Vec<String>> {
     Ok(vec!["units of columns were written anew".to_owned()])
 }
 
+/// What was read; none of what is damaged.
+fn readable<T>(read: Result<T>) -> Result<Option<T>> {
+    match read {
+        Err(error) if is_damage(&error) => Ok(None),
+        read => read.map(Some),
+    }
+}
+
 /// Every revision with its stored hash. A table and its indexes may differ, and one of the two is lost when indexes are
 /// made anew.
-fn sound_revisions(tx: &Transaction) -> Vec<Material> {
-    let named: Vec<String> =
-        rows(tx, "SELECT slug FROM material", [], |row| row.get(0)).unwrap_or_default();
+fn sound_revisions(tx: &Transaction) -> Result<Vec<Material>> {
+    // Without an index, which may have rows that are not there: to look for one would end every write.
+    let sql = "SELECT slug, number FROM revision NOT INDEXED
+               JOIN material NOT INDEXED ON material.id = material_id";
+    let named = readable(rows(tx, sql, [], |row| Ok((row.get(0)?, row.get(1)?))))?;
+    let named: Vec<(String, u32)> = named.unwrap_or_default();
     let mut sound = Vec::new();
-    for slug in named.iter().filter_map(|name| name.parse::<Slug>().ok()) {
-        let listed = read::revision_rows(tx, &slug).unwrap_or_default();
-        let read =
-            listed.iter().filter_map(|row| read::get_in(tx, &slug, Some(row.number)).ok()?);
-        sound.extend(read.filter(is_as_stored).map(|stored| stored.material));
+    for (name, number) in named {
+        let Ok(slug) = name.parse::<Slug>() else { continue };
+        sound.extend(sound_revision(tx, &slug, number)?.map(|stored| stored.material));
     }
-    sound
+    Ok(sound)
 }
 
 fn is_as_stored(stored: &StoredRevision) -> bool {
@@ -219,9 +264,11 @@ fn renamed_materials(tx: &Transaction) -> Result<Vec<LostMaterial>> {
 /// Gives a material the name that the lists have, where its content then has the stored hash.
 fn renamed_material(tx: &Transaction, renamed: &LostMaterial) -> Result<Vec<String>> {
     let LostMaterial { id, slug, .. } = renamed;
+    // A damaged line is made anew.
+    let Ok(name) = slug.parse::<Slug>() else { return Ok(Vec::new()) };
     tx.execute_batch("SAVEPOINT renamed")?;
     tx.execute("UPDATE material SET slug = ?2 WHERE id = ?1", params![id, slug])?;
-    let stored = slug.parse().ok().and_then(|name: Slug| read::get_in(tx, &name, None).ok()?);
+    let stored = readable(read::get_in(tx, &name, None))?.flatten();
     if stored.as_ref().is_some_and(is_as_stored) {
         tx.execute_batch("RELEASE renamed")?;
         return Ok(vec![format!("`{slug}` has its name again")]);
@@ -231,8 +278,8 @@ fn renamed_material(tx: &Transaction, renamed: &LostMaterial) -> Result<Vec<Stri
 }
 
 /// A revision of a material if it has its stored content.
-fn sound_revision(tx: &Transaction, slug: &Slug, number: u32) -> Option<StoredRevision> {
-    read::get_in(tx, slug, Some(number)).ok().flatten().filter(is_as_stored)
+fn sound_revision(tx: &Transaction, slug: &Slug, number: u32) -> Result<Option<StoredRevision>> {
+    Ok(readable(read::get_in(tx, slug, Some(number)))?.flatten().filter(is_as_stored))
 }
 
 /// What is recorded with a revision that a repair takes from this one.
@@ -244,10 +291,15 @@ fn repaired_from(slug: &Slug, row: &RevisionRow, origin: Option<Origin>) -> Acti
 
 /// Replaces the damaged parts of the record of a revision with its stored content.
 fn record_of(tx: &Transaction, slug: &Slug, row: &RevisionRow) -> Result<Vec<String>> {
-    if sound_revision(tx, slug, row.number).is_none() {
+    if sound_revision(tx, slug, row.number)?.is_none() {
         return Ok(Vec::new());
     }
-    let changed = record::restore(tx, row.id, Some(&repaired_from(slug, row, None)))?;
+    let changed = write::restore_record(
+        tx,
+        row.id,
+        (slug, row.number),
+        Some(&repaired_from(slug, row, None)),
+    )?;
     let words = changed.iter().filter_map(|part| match part {
         Part::Number => None,
         Part::Date => Some("its date is that of the repair now"),
@@ -267,7 +319,7 @@ fn record_of(tx: &Transaction, slug: &Slug, row: &RevisionRow) -> Result<Vec<Str
 /// Makes the latest revision of a material the current one, if that is its number.
 fn latest_revision(tx: &Transaction, slug: &Slug) -> Result<Vec<String>> {
     let Some(latest) = read::revision_rows(tx, slug)?.pop() else { return Ok(Vec::new()) };
-    if !record::has_its_number(tx, latest.id)? {
+    if !record::has_its_number(tx, latest.id, slug, latest.number)? {
         return Ok(Vec::new());
     }
     let sql = "UPDATE material SET current_revision = ?2 WHERE slug = ?1 AND current_revision < ?2";
@@ -323,16 +375,17 @@ fn lost_material(tx: &Transaction, lost: &LostMaterial) -> Result<Vec<String>> {
 fn unreachable_lines(tx: &Transaction) -> Result<Vec<String>> {
     let condition = "NOT IN (SELECT id FROM material)";
     let of_no_revision = "AND material_id NOT IN (SELECT material_id FROM revision)";
-    let lines = tx.execute(
+    let mut lines = tx.execute(
         &format!("DELETE FROM entry WHERE material_id {condition} {of_no_revision}"),
         [],
     )?;
     for table in ["entry_tag", "outline"] {
-        tx.execute(&format!("DELETE FROM {table} WHERE slug NOT IN (SELECT slug FROM entry)"), [])?;
+        let sql = format!("DELETE FROM {table} WHERE slug NOT IN (SELECT slug FROM entry)");
+        lines += tx.execute(&sql, [])?;
     }
-    tx.execute(&format!("DELETE FROM search WHERE rowid {condition}"), [])?;
+    lines += tx.execute(&format!("DELETE FROM search WHERE rowid {condition}"), [])?;
     Ok((lines > 0)
-        .then(|| format!("{lines} of the lines of lists were of no material and were removed"))
+        .then(|| format!("{lines} rows of lists and searches were of no material and were removed"))
         .into_iter()
         .collect())
 }
@@ -341,29 +394,33 @@ fn unreachable_lines(tx: &Transaction) -> Result<Vec<String>> {
 /// had another status, or another revision has not the number with which it was stored.
 fn lost_current_revision(tx: &Transaction, slug: &Slug) -> Result<Vec<String>> {
     let sql = "SELECT current_revision, status FROM material
-               LEFT JOIN entry ON entry.material_id = material.id WHERE material.slug = ?1 AND NOT EXISTS
+               LEFT JOIN entry ON entry.material_id = material.id AND revision = current_revision
+               WHERE material.slug = ?1 AND NOT EXISTS
                (SELECT 1 FROM revision WHERE material_id = material.id AND number = current_revision)";
     let lost: Vec<(i64, Option<String>)> =
         rows(tx, sql, [slug.as_str()], |row| Ok((row.get(0)?, row.get(1)?)))?;
     let Some((lost, status)) = lost.into_iter().next() else { return Ok(Vec::new()) };
     for row in read::revision_rows(tx, slug)?.into_iter().rev() {
-        let Some(StoredRevision { material, activity, .. }) = sound_revision(tx, slug, row.number)
+        let Some(StoredRevision { material, activity, .. }) = sound_revision(tx, slug, row.number)?
         else {
             continue;
         };
         let number = row.number;
-        if !record::has_its_number(tx, row.id)? {
+        if !record::has_its_number(tx, row.id, slug, number)? {
             return Err(read::damaged(format!(
                 "its revision {lost} is lost, and what is called revision {number} was stored under another number"
             )));
         }
-        if status.as_deref() != Some(material.status.as_str()) {
+        // Lists do not know the successor of a superseded material.
+        let is_confirmed = material.status.superseded_by().is_none()
+            && status.as_deref() == Some(material.status.as_str());
+        if !is_confirmed {
             return Err(read::damaged(format!(
                 "its revision {lost} is lost, and may have had another status than revision {number}, the latest that is \
                  sound; add the material again"
             )));
         }
-        // Whoever answers for the content answers for its repetition.
+        // An origin is that of the content.
         let origin = activity.and_then(|activity| activity.origin);
         let by = repaired_from(slug, &row, origin);
         let added = write::MaterialWriter::new(tx).add(&material, Some(&by))?.revision();
@@ -384,13 +441,14 @@ fn revision(
 ) -> Result<Vec<String>> {
     let RevisionRow { id, number, content_hash } = row;
     let place = format!("`{slug}@{number}`");
-    let anew = |content: &Material| {
-        write::rewrite(tx, *id, content).map(|()| vec![format!("{place} was written anew")])
-    };
-    if let Some(stored) = read::get_in(tx, slug, Some(*number)).ok().flatten() {
+    if let Some(stored) = readable(read::get_in(tx, slug, Some(*number)))?.flatten() {
         if is_as_stored(&stored) {
             let differences = row_check.compare(tx, &stored)?;
-            return if differences.is_empty() { Ok(Vec::new()) } else { anew(&stored.material) };
+            if differences.is_empty() {
+                return Ok(Vec::new());
+            }
+            write::rewrite(tx, *id, &stored.material)?;
+            return Ok(vec![format!("{place} was written anew")]);
         }
         if let Some((by_structure, fits)) = by_structure(tx, *id, &stored.material, content_hash)? {
             write::rewrite(tx, *id, &by_structure)?;
@@ -401,7 +459,9 @@ fn revision(
         }
     }
     let content = at_hand.iter().find(|material| material.content_hash() == *content_hash);
-    content.map_or(Ok(Vec::new()), |content| anew(content))
+    let Some(content) = content else { return Ok(Vec::new()) };
+    write::rewrite(tx, *id, content)?;
+    Ok(vec![format!("{place} was written anew")])
 }
 
 /// The content of this hash that some fits of a revision give with the values that migration 11 has left in
@@ -438,20 +498,30 @@ fn by_structure(
 
 /// Rebuilds lists and searches. Where the current revision is not what was stored, they keep what they say of it.
 fn lists(tx: &Transaction, slugs: &[Slug]) -> Result<Vec<String>> {
+    let before = readable(stale(tx))?.unwrap_or_default();
     tx.execute("INSERT INTO search (search) VALUES ('rebuild')", [])?;
     let mut adding = write::MaterialWriter::new(tx);
     for slug in slugs {
-        let Ok(Some(stored)) = read::get_in(tx, slug, None) else { continue };
-        let sql = "SELECT material.id, revision.id FROM material
+        let Some(stored) = readable(read::get_in(tx, slug, None))?.flatten() else { continue };
+        let sql =
+            "SELECT material.id, revision.id, (SELECT max(revision) FROM entry WHERE slug = ?1)
+                   FROM material
                    JOIN revision ON material_id = material.id AND number = current_revision
                    WHERE slug = ?1";
-        let (material_id, revision_id) =
-            tx.query_row(sql, [slug.as_str()], |row| Ok((row.get(0)?, row.get(1)?)))?;
-        if is_as_stored(&stored) && record::has_its_number(tx, revision_id)? {
+        let (material_id, revision_id, listed): (i64, i64, Option<u32>) =
+            tx.query_row(sql, [slug.as_str()], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
+        // A list that knows a later revision knows one that is lost.
+        if is_as_stored(&stored)
+            && record::has_its_number(tx, revision_id, slug, stored.revision)?
+            && listed.is_none_or(|listed| listed <= stored.revision)
+        {
             adding.queue(material_id, &stored.material)?;
         }
     }
-    adding.finish().map(|()| Vec::new())
+    adding.finish()?;
+    let after = stale(tx)?;
+    let mended = before.iter().filter(|slug| !after.contains(slug));
+    Ok(mended.map(|slug| format!("lists and searches of `{slug}` were made anew")).collect())
 }
 
 #[cfg(test)]

@@ -81,7 +81,7 @@ pub struct Summary {
     pub observations: u32,
     /// Number of scattering models with parameters.
     pub fits: u32,
-    /// Whether this is not what is stored, or cannot be compared with it: then any of it may be wrong.
+    /// Whether it is known that something else is stored than this says: then any of it may be wrong.
     #[serde(rename = "damaged", skip_serializing_if = "std::ops::Not::not")]
     pub is_damaged: bool,
 }

@@ -1,7 +1,7 @@
 //! Reads rows and columns as plain values.
 
 use rusqlite::types::{FromSql, FromSqlError, FromSqlResult, Type, ValueRef};
-use rusqlite::{Connection, Error, Params, Result, Row};
+use rusqlite::{Connection, Error, Params, Result, Row, Transaction, TransactionBehavior};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde::de::value::{Error as WordError, StrDeserializer};
@@ -17,6 +17,20 @@ pub(super) fn rows<T>(
     read: impl FnMut(&Row) -> Result<T>,
 ) -> Result<Vec<T>> {
     conn.prepare_cached(sql)?.query_map(values, read)?.collect()
+}
+
+/// A time in which reads see no writes of other programs. One may lie within another.
+pub(super) struct Moment<'a> {
+    /// The transaction, of the outermost one.
+    _tx: Option<Transaction<'a>>,
+}
+
+pub(super) fn moment(conn: &Connection) -> Result<Moment<'_>> {
+    if !conn.is_autocommit() {
+        return Ok(Moment { _tx: None });
+    }
+    let tx = Transaction::new_unchecked(conn, TransactionBehavior::Deferred)?;
+    Ok(Moment { _tx: Some(tx) })
 }
 
 /// A column of JSON.

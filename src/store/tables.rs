@@ -3,9 +3,9 @@
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, Result};
 
-use super::connect::LATEST_SCHEMA;
 use super::database::Store;
 use super::error::{InFile, StoreError};
+use super::latest::LATEST_SCHEMA;
 use super::law;
 use super::rows::rows;
 
@@ -107,9 +107,10 @@ impl Store {
 
 /// Kind, name, table and statement of everything in the file.
 pub(super) fn schema(conn: &Connection) -> Result<Vec<[Option<String>; 4]>> {
-    // Tables of ANALYZE help to find rows and have no content.
+    // Tables of ANALYZE help to find rows and have no content; that of AUTOINCREMENT is of a table of others.
     let sql = "SELECT type, name, tbl_name, sql FROM sqlite_schema
-               WHERE name NOT LIKE 'sqlite\\_stat%' ESCAPE '\\' ORDER BY type, name";
+               WHERE name NOT LIKE 'sqlite\\_stat%' ESCAPE '\\' AND name <> 'sqlite_sequence'
+               ORDER BY type, name";
     conn.prepare(sql)?
         .query_map([], |row| Ok([row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?]))?
         .collect()
@@ -217,11 +218,11 @@ pub(super) fn quoted(name: &str) -> String {
     format!("\"{}\"", name.replace('"', "\"\""))
 }
 
-/// Tables that record who made a revision, which does not follow from its content.
+/// Tables of a revision that do not follow from its content: what made it, and the hashes of that.
 pub(super) const MAKING: [&str; 5] =
     ["record", "activity", "activity_input", "origin", "origin_author"];
 
-/// The tables that this program makes. What others have made beside them is left alone.
+/// The tables that this program makes. Those of others are left alone.
 pub(super) fn own_tables(conn: &Connection) -> Result<Vec<Table>> {
     let mut tables = tables(conn)?;
     tables.retain(|table| LATEST_SCHEMA.contains(&format!("CREATE TABLE {} (", table.name)));

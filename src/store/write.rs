@@ -11,10 +11,11 @@ use serde::Serialize;
 use super::error::is_damage;
 use super::find::outline::{self, OutlineEntry};
 use super::pages::check_pages;
+use super::record::{self, Part};
 use super::results::{Addition, Removal};
 use super::rows::rows;
-use super::tables::{follows_from_content, own_tables};
-use super::{law, read, record};
+use super::tables::{MAKING, follows_from_content, own_tables};
+use super::{law, read};
 use crate::formats::EffectEntry;
 use crate::material::{Activity, Covariance, Curve, Fit, Illumination, Material, Slug};
 use crate::measure::statistics::by_angle;
@@ -50,9 +51,10 @@ impl<'a> MaterialWriter<'a> {
                 return Ok(Addition::Unchanged(current.number));
             }
             Some(Current { material_id, number, content_hash: Some((revision_id, stored)) })
-                if stored == content_hash && record::has_its_number(tx, revision_id)? =>
+                if stored == content_hash
+                    && record::has_its_number(tx, revision_id, &material.slug, number)? =>
             {
-                record::restore(tx, revision_id, activity)?;
+                restore_record(tx, revision_id, (&material.slug, number), activity)?;
                 rewrite(tx, revision_id, material)?;
                 (Addition::Repaired(number), material_id)
             }
@@ -91,11 +93,22 @@ impl<'a> MaterialWriter<'a> {
 
     /// Rewrites the rows of the queued materials in lists and searches.
     fn write_lists(&mut self) -> Result<()> {
-        const STEPS: [&str; 5] = [
-            "DELETE FROM entry WHERE material_id IN (SELECT value FROM json_each(?1))",
+        // Rows are replaced and not removed first: what others have made may refer to them.
+        const STEPS: [&str; 6] = [
+            "DELETE FROM entry WHERE material_id IN (SELECT value FROM json_each(?1))
+             AND slug NOT IN (SELECT slug FROM material WHERE id = material_id)",
+            "DELETE FROM entry_tag WHERE slug IN (
+                 SELECT slug FROM material WHERE id IN (SELECT value FROM json_each(?1)))",
             "DELETE FROM search WHERE rowid IN (SELECT value FROM json_each(?1))",
             "INSERT INTO entry SELECT * FROM entry_made
-             WHERE material_id IN (SELECT value FROM json_each(?1))",
+             WHERE material_id IN (SELECT value FROM json_each(?1))
+             ON CONFLICT (slug) DO UPDATE SET
+                 material_id = excluded.material_id, revision = excluded.revision,
+                 name = excluded.name, class = excluded.class, status = excluded.status,
+                 kind = excluded.kind, frequency_min_hz = excluded.frequency_min_hz,
+                 frequency_max_hz = excluded.frequency_max_hz, curves = excluded.curves,
+                 observations = excluded.observations, fits = excluded.fits,
+                 fitted = excluded.fitted",
             // Through its view SQLite would read all materials.
             "INSERT OR IGNORE INTO entry_tag
              SELECT slug, value FROM material
@@ -117,21 +130,28 @@ impl<'a> MaterialWriter<'a> {
     }
 }
 
-/// Brings the fits that an older program stored to schema 11: the values of their parameters in `fit_parameter` alone,
-/// their numbers in `fit_number`. Fits of a damaged revision stay as they are, so that the rest of the file can be read.
-pub(super) fn bring_fits_to_one_value(tx: &Transaction, torn: &[i64]) -> Result<()> {
-    let revisions: Vec<i64> = rows(tx, "SELECT id FROM revision", [], |row| row.get(0))?;
+/// Takes a step of a migration for every revision but those on damaged pages. A step that meets damage is undone alone,
+/// so that the rest of the file can be read.
+fn each_revision(tx: &Transaction, torn: &[i64], step: impl Fn(i64) -> Result<()>) -> Result<()> {
+    let revisions: Vec<i64> =
+        rows(tx, "SELECT id FROM revision NOT INDEXED", [], |row| row.get(0))?;
     for revision_id in revisions.into_iter().filter(|id| !torn.contains(id)) {
-        tx.execute_batch("SAVEPOINT fits")?;
-        match bring_to_one_value(tx, revision_id) {
-            Ok(()) => tx.execute_batch("RELEASE fits")?,
+        tx.execute_batch("SAVEPOINT revision")?;
+        match step(revision_id) {
+            Ok(()) => tx.execute_batch("RELEASE revision")?,
             Err(error) if is_damage(&error) => {
-                tx.execute_batch("ROLLBACK TO fits; RELEASE fits")?;
+                tx.execute_batch("ROLLBACK TO revision; RELEASE revision")?;
             }
             Err(error) => return Err(error),
         }
     }
     Ok(())
+}
+
+/// Brings the fits that an older program stored to schema 11: the values of their parameters in `fit_parameter` alone,
+/// their numbers in `fit_number`.
+pub(super) fn bring_fits_to_one_value(tx: &Transaction, torn: &[i64]) -> Result<()> {
+    each_revision(tx, torn, |revision_id| bring_to_one_value(tx, revision_id))
 }
 
 fn bring_to_one_value(tx: &Transaction, revision_id: i64) -> Result<()> {
@@ -146,21 +166,15 @@ fn bring_to_one_value(tx: &Transaction, revision_id: i64) -> Result<()> {
 
 /// Computes the statistics of curves that an older program did not store.
 pub(super) fn fill_statistics(tx: &Transaction, torn: &[i64]) -> Result<()> {
-    let sql = "SELECT DISTINCT revision_id FROM curve
-               WHERE revision_id NOT IN (SELECT revision_id FROM curve_statistic)";
-    let revisions: Vec<i64> = rows(tx, sql, [], |row| row.get(0))?;
-    for revision_id in revisions.into_iter().filter(|id| !torn.contains(id)) {
-        let curves = match read::curves(tx, revision_id, None) {
-            // A damaged curve has none.
-            Err(error) if is_damage(&error) => continue,
-            curves => curves?,
-        };
-        for curve in curves {
-            let statistics = by_angle(&curve.observations);
-            Rows { tx, revision_id }.statistics(&curve.name, &statistics)?;
+    let is_filled = "SELECT EXISTS (SELECT 1 FROM curve_statistic WHERE revision_id = ?1)";
+    each_revision(tx, torn, |revision_id| {
+        if tx.prepare_cached(is_filled)?.query_row([revision_id], |row| row.get(0))? {
+            return Ok(());
         }
-    }
-    Ok(())
+        read::curves(tx, revision_id, None)?.iter().try_for_each(|curve| {
+            Rows { tx, revision_id }.statistics(&curve.name, &by_angle(&curve.observations))
+        })
+    })
 }
 
 /// Removes materials with all their rows, all or none.
@@ -225,8 +239,58 @@ fn current(tx: &Transaction, slug: &Slug) -> Result<Option<Current>> {
 fn is_intact(tx: &Transaction, material: &Material, current: &Current, hash: &str) -> Result<bool> {
     let Some((id, stored)) = &current.content_hash else { return Ok(false) };
     Ok(stored == hash
-        && record::changed(tx, *id)?.is_empty()
+        && record::changed(tx, *id, &material.slug, current.number)?.is_empty()
         && read_back(tx, material, hash).is_ok())
+}
+
+/// Replaces the damaged parts of a record: the command and the origin by those of `by`, the date by
+/// that of now, not above those of later revisions, and the program by this one. Returns the parts.
+///
+/// Fails where the revision has another name or number than was stored: then it must not be taken for what it is
+/// called.
+pub(super) fn restore_record(
+    tx: &Transaction,
+    revision_id: i64,
+    (slug, number): (&Slug, u32),
+    by: Option<&Activity>,
+) -> Result<Vec<Part>> {
+    let changed = record::changed(tx, revision_id, slug, number)?;
+    if changed.contains(&Part::Number) {
+        return Err(read::damaged("it has another name or number than was stored".to_owned()));
+    }
+    if changed.is_empty() {
+        return Ok(changed);
+    }
+    let made = if changed.contains(&Part::Command) {
+        by.map(|by| (by.command.clone(), by.inputs.clone()))
+    } else {
+        read::command(tx, revision_id)?
+    };
+    let from = if changed.contains(&Part::Origin) {
+        by.and_then(|by| by.origin.clone())
+    } else {
+        read::origin(tx, revision_id)?
+    };
+    for table in MAKING.iter().rev() {
+        tx.execute(&format!("DELETE FROM {table} WHERE revision_id = ?1"), [revision_id])?;
+    }
+    // What has an origin was imported.
+    let made = made.or_else(|| from.is_some().then(|| ("import".to_owned(), Vec::new())));
+    if let Some((command, inputs)) = made {
+        Rows { tx, revision_id }.activity(&Activity { command, inputs, origin: from })?;
+    }
+    if changed.contains(&Part::Date) {
+        // No revision is older than an earlier one.
+        let sql = format!(
+            "UPDATE revision SET program_version = ?2, added_at = min({NOW}, coalesce((
+                 SELECT min(added_at) FROM revision AS later
+                 WHERE later.material_id = revision.material_id AND later.number > revision.number
+             ), {NOW})) WHERE id = ?1"
+        );
+        tx.execute(&sql, params![revision_id, env!("CARGO_PKG_VERSION")])?;
+    }
+    record::write(tx, revision_id)?;
+    Ok(changed)
 }
 
 /// One more than the greatest revision number of a material.
@@ -244,6 +308,8 @@ fn read_back(tx: &Transaction, material: &Material, content_hash: &str) -> Resul
         Ok(Some(back)) if back.material.content_hash() == content_hash => return Ok(()),
         Ok(Some(_)) => format!("`{slug}` was read back with another content"),
         Ok(None) => format!("`{slug}` was not there when it was read back"),
+        // The rest of the file was damaged before.
+        Err(error) if is_damage(&error) => return Err(error),
         Err(error) => format!("`{slug}` could not be read back: {error}"),
     };
     Err(Error::ToSqlConversionFailure(problem.into()))
@@ -296,6 +362,9 @@ fn content(material: &Material) -> Result<[Value; 15]> {
     ])
 }
 
+/// The date in SQL: UTC, ISO 8601, to the second, of a year of four digits.
+const NOW: &str = "coalesce(strftime('%Y-%m-%dT%H:%M:%SZ', 'now'), '9999-12-31T23:59:59Z')";
+
 /// Writes a revision and makes it the current one. Returns the row number of the material.
 fn revision(
     tx: &Transaction,
@@ -310,11 +379,10 @@ fn revision(
     let material_id: i64 = tx
         .prepare_cached(upsert)?
         .query_row(params![material.slug.as_str(), number], |row| row.get(0))?;
-    // A clock may be wrong: no revision is older than an earlier one, and no year has five digits.
+    // A clock may be wrong: no revision is older than an earlier one.
     let insert = format!(
         "INSERT INTO revision ({CONTENT}, material_id, number, content_hash, program_version, added_at)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, max(
-             coalesce(strftime('%Y-%m-%dT%H:%M:%SZ', 'now'), '9999-12-31T23:59:59Z'),
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, max({NOW},
              coalesce((SELECT max(added_at) FROM revision WHERE material_id = ?), '')))"
     );
     let own: [Value; 5] = [
@@ -334,9 +402,9 @@ fn revision(
 }
 
 /// Writes the rows that belong to one revision.
-pub(super) struct Rows<'a> {
-    pub tx: &'a Transaction<'a>,
-    pub revision_id: i64,
+struct Rows<'a> {
+    tx: &'a Transaction<'a>,
+    revision_id: i64,
 }
 
 impl Rows<'_> {

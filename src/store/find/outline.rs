@@ -5,13 +5,10 @@ use std::collections::BTreeMap;
 use rusqlite::{Connection, Result, Row, params, params_from_iter};
 
 use super::filter::{self, Filter};
-use super::moment;
-use super::stale::check_outlines;
 use crate::brdf::{Brdf, Outline};
 use crate::material::{Lobes, Slug};
 use crate::radar::Footprint;
-use crate::store::database::Store;
-use crate::store::error::{InFile, StoreError, is_damage};
+use crate::store::error::is_damage;
 use crate::store::read::{Rendered, rendered_in};
 use crate::store::rows::rows;
 
@@ -30,27 +27,14 @@ pub struct OutlineEntry {
     pub footprint: Option<Footprint>,
     /// Whose lobes the model has.
     pub lobes: Lobes,
+    /// Whether the material is damaged; this is what was stored.
+    pub is_damaged: bool,
 }
 
 const COLUMNS: &str = "slug, theta_min_rad, theta_max_rad, model_hash, levels, footprint, lobes";
 
-impl Store {
-    /// Outlines of the materials that match a filter, sorted by name.
-    ///
-    /// # Errors
-    /// When the file cannot be read; where a list or an outline is not that of what is stored, which is compared up to
-    /// 8 MiB.
-    pub fn outlines(&self, filter: &Filter) -> std::result::Result<Vec<OutlineEntry>, StoreError> {
-        let found = || {
-            let tx = moment(&self.conn)?;
-            check_outlines(&tx, filter)?;
-            all(&tx, filter)
-        };
-        found().in_file(&self.path)
-    }
-}
-
-fn all(conn: &Connection, filter: &Filter) -> Result<Vec<OutlineEntry>> {
+/// Outlines of the materials that match a filter, sorted by name.
+pub(super) fn all(conn: &Connection, filter: &Filter) -> Result<Vec<OutlineEntry>> {
     if *filter == Filter::default() {
         return rows(conn, &format!("SELECT {COLUMNS} FROM outline ORDER BY slug"), [], outlined);
     }
@@ -74,6 +58,7 @@ fn outlined(row: &Row) -> Result<OutlineEntry> {
         outline: levels.and_then(Outline::from_bytes),
         footprint: row.get(5)?,
         lobes: row.get::<_, Option<Lobes>>(6)?.unwrap_or_default(),
+        is_damaged: false,
     })
 }
 
@@ -106,6 +91,7 @@ pub(crate) fn line(slug: &Slug, rendered: &Rendered) -> OutlineEntry {
         outline: model.and_then(Outline::new),
         footprint: rendered.footprint,
         lobes: rendered.lobes,
+        is_damaged: false,
     }
 }
 
@@ -114,9 +100,15 @@ fn model_hash(model: &Brdf) -> Option<[u8; 16]> {
     hash.as_bytes().first_chunk().copied()
 }
 
-/// Writes the outlines of all materials, for a file from an older program.
-pub(crate) fn fill(conn: &Connection) -> Result<()> {
-    each(conn, |line| write(conn, &line)).map(|_| ())
+/// Writes the outlines of all materials, for a file from an older program. Those of which the current revision is on
+/// damaged pages, `torn`, get none.
+pub(crate) fn fill(conn: &Connection, torn: &[i64]) -> Result<()> {
+    let sql = "SELECT slug FROM material JOIN revision NOT INDEXED
+               ON material_id = material.id AND number = current_revision
+               WHERE revision.id IN (SELECT value FROM json_each(?1))";
+    let torn = serde_json::json!(torn).to_string();
+    let torn: Vec<Slug> = rows(conn, sql, [torn], |row| row.get(0))?;
+    each(conn, &torn, |line| write(conn, &line)).map(|_| ())
 }
 
 /// Outlines that are not those of what is stored.
@@ -132,7 +124,7 @@ pub(super) fn stale(conn: &Connection) -> Result<Stale> {
     let mut kept: BTreeMap<String, OutlineEntry> =
         all(conn, &Filter::default())?.into_iter().map(|line| (line.slug.clone(), line)).collect();
     let mut changed = Vec::new();
-    let unreadable = each(conn, |line| {
+    let unreadable = each(conn, &[], |line| {
         if !kept.remove(&line.slug).is_some_and(|kept| is_same(&kept, &line)) {
             changed.push(line.slug);
         }
@@ -153,10 +145,17 @@ fn is_same(kept: &OutlineEntry, made: &OutlineEntry) -> bool {
         && (kept.footprint, kept.lobes) == (made.footprint, made.lobes)
 }
 
-/// Gives `take` the outline that each material should have. Returns the materials that cannot be read: they must not
-/// make the whole file unreadable.
-fn each(conn: &Connection, mut take: impl FnMut(OutlineEntry) -> Result<()>) -> Result<Vec<Slug>> {
-    let slugs: Vec<Slug> = rows(conn, "SELECT slug FROM material", [], |row| row.get(0))?;
+/// Gives `take` the outline that each material should have, without those of `torn`. Returns the materials that cannot
+/// be read: they must not make the whole file unreadable.
+fn each(
+    conn: &Connection,
+    torn: &[Slug],
+    mut take: impl FnMut(OutlineEntry) -> Result<()>,
+) -> Result<Vec<Slug>> {
+    let named: Vec<String> = rows(conn, "SELECT slug FROM material", [], |row| row.get(0))?;
+    // A damaged name is found where it is read.
+    let slugs = named.iter().filter_map(|name| name.parse::<Slug>().ok());
+    let slugs = slugs.filter(|slug| !torn.contains(slug));
     let mut unreadable = Vec::new();
     for slug in slugs {
         match rendered_in(conn, &slug) {

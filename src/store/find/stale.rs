@@ -8,38 +8,42 @@ use super::filter::Filter;
 use super::outline;
 use crate::material::Slug;
 use crate::store::error::is_damage;
-use crate::store::pages::is_small;
-use crate::store::read::damaged;
+use crate::store::pages::{is_small, renew_search};
+use crate::store::read::{damaged, get_in};
 use crate::store::rows::rows;
 
-/// The materials of which a list without a filter says something else than what is stored. Fails where it leaves one
-/// out, and where a list with a filter says or leaves out anything else than what is stored: its lines may be of the
-/// wrong materials.
+/// The materials of which the list of a filter says something else than what is stored. Fails where it leaves one out,
+/// and, of a list with a filter, where that is mended by a repair: its lines may be of the wrong materials.
 pub(super) fn stale_lines(conn: &Connection, filter: &Filter) -> Result<Vec<String>> {
     if !is_small(conn)? {
         return Ok(Vec::new());
     }
     if *filter != Filter::default() {
-        return check_filter(conn, filter).map(|()| Vec::new());
+        return check_filter(conn, filter);
     }
     // No index is read, and what is damaged elsewhere hides nothing.
-    let sql = "SELECT slug FROM material WHERE slug NOT IN (SELECT slug FROM entry)";
-    refuse(&rows(conn, sql, [], |row| row.get(0))?)?;
+    let sql = "SELECT slug FROM material WHERE slug NOT IN (SELECT slug FROM entry)
+               AND slug <> '' AND slug NOT GLOB '*[^a-z0-9-]*'";
+    let left_out: Vec<String> = rows(conn, sql, [], |row| row.get(0))?;
+    left_out.first().map_or(Ok(()), |slug| Err(damaged(problem(slug))))?;
     ENTRIES.readable_stale(conn)
 }
 
-/// Fails where the index of texts or the list is not that of what is stored.
-pub(super) fn check_texts(conn: &Connection) -> Result<()> {
-    if is_small(conn)? { check(conn, &[ENTRIES, TEXTS]) } else { Ok(()) }
+/// The damaged materials, which searches know as they were. Fails where the index of texts or the list is not that of
+/// what is stored.
+pub(super) fn stale_texts(conn: &Connection) -> Result<Vec<String>> {
+    if is_small(conn)? { check(conn, &[ENTRIES, TEXTS]) } else { Ok(Vec::new()) }
 }
 
-/// Fails where a list or an outline is not that of what is stored.
-pub(super) fn check_outlines(conn: &Connection, filter: &Filter) -> Result<()> {
+/// The damaged materials, of which outlines are as they were. Fails where a list or an outline is not that of what is
+/// stored.
+pub(super) fn stale_outlines(conn: &Connection, filter: &Filter) -> Result<Vec<String>> {
     if !is_small(conn)? {
-        return Ok(());
+        return Ok(Vec::new());
     }
-    check_filter(conn, filter)?;
-    refuse(&outline::stale(conn)?.changed)
+    let mut stale = check_filter(conn, filter)?;
+    stale.extend(damaged_of(conn, outline::stale(conn)?.changed)?);
+    Ok(stale)
 }
 
 /// A table of lists or searches, with the query of the materials of which it says something else than what is stored.
@@ -111,31 +115,48 @@ impl Lines {
 
     /// Fails where the pages or indexes of the table are damaged.
     fn check_pages(&self, conn: &Connection) -> Result<()> {
+        renew_search(conn);
         let sql = "SELECT integrity_check FROM pragma_integrity_check(?1)";
         let found: Vec<String> = rows(conn, sql, [self.table], |row| row.get(0))?;
         found.into_iter().find(|line| line != "ok").map_or(Ok(()), |line| Err(damaged(line)))
     }
 }
 
-fn check_filter(conn: &Connection, filter: &Filter) -> Result<()> {
+fn check_filter(conn: &Connection, filter: &Filter) -> Result<Vec<String>> {
     match filter {
-        all if *all == Filter::default() => refuse_stale(conn, &[ENTRIES]),
+        all if *all == Filter::default() => stale_of(conn, &[ENTRIES]),
         Filter { tag: Some(_), .. } => check(conn, &[ENTRIES, TAGS]),
         _ => check(conn, &[ENTRIES]),
     }
 }
 
-fn check(conn: &Connection, tables: &[Lines]) -> Result<()> {
+fn check(conn: &Connection, tables: &[Lines]) -> Result<Vec<String>> {
     tables.iter().try_for_each(|table| table.check_pages(conn))?;
-    refuse_stale(conn, tables)
+    stale_of(conn, tables)
 }
 
-fn refuse_stale(conn: &Connection, tables: &[Lines]) -> Result<()> {
-    tables.iter().try_for_each(|table| refuse(&table.readable_stale(conn)?))
+fn stale_of(conn: &Connection, tables: &[Lines]) -> Result<Vec<String>> {
+    let mut stale = Vec::new();
+    for table in tables {
+        stale.extend(damaged_of(conn, table.readable_stale(conn)?)?);
+    }
+    Ok(stale)
 }
 
-fn refuse(stale: &[String]) -> Result<()> {
-    stale.first().map_or(Ok(()), |slug| Err(damaged(problem(slug))))
+/// Those materials that are damaged themselves: a repair leaves what lists say of them as it was. Fails where one is
+/// sound, and lists are not.
+fn damaged_of(conn: &Connection, stale: Vec<String>) -> Result<Vec<String>> {
+    for slug in &stale {
+        let name = slug.parse::<Slug>().ok();
+        let current = match name.map(|name| get_in(conn, &name, None)).transpose() {
+            Err(error) if is_damage(&error) => continue,
+            current => current?.flatten(),
+        };
+        if current.is_none_or(|stored| stored.material.content_hash() == stored.content_hash) {
+            return Err(damaged(problem(slug)));
+        }
+    }
+    Ok(stale)
 }
 
 /// What is wrong with the lines of a material.

@@ -22,6 +22,9 @@ pub struct Match {
     pub status: String,
     /// Rank (BM25), smaller is better. Comparable only within one search; 0 where not ranked.
     pub rank: f64,
+    /// Whether the material is damaged; this is what was stored.
+    #[serde(rename = "damaged", skip_serializing_if = "std::ops::Not::not")]
+    pub is_damaged: bool,
 }
 
 /// Largest number of words of a search; further ones are ignored.
@@ -112,7 +115,7 @@ fn called(conn: &Connection, words: &str, most: u32) -> Result<Vec<Match>> {
         let rest = slug.as_str().strip_prefix(&begin).unwrap_or_default();
         let snippet = format!("[{begin}]{rest}");
         let (name, revision, status) = (row.get(1)?, row.get(2)?, row.get(3)?);
-        Ok(Match { slug, name, revision, status, snippet, rank: 0.0 })
+        Ok(Match { slug, name, revision, status, snippet, rank: 0.0, is_damaged: false })
     })
 }
 
@@ -124,6 +127,7 @@ fn hit(row: &Row) -> Result<Match> {
         status: row.get(3)?,
         snippet: row.get(4)?,
         rank: row.get(5)?,
+        is_damaged: false,
     })
 }
 

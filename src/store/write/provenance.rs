@@ -202,7 +202,7 @@ impl Rows<'_> {
         })
     }
 
-    pub(in crate::store) fn activity(&self, activity: &Activity) -> Result<()> {
+    pub(super) fn activity(&self, activity: &Activity) -> Result<()> {
         self.insert(
             "INSERT INTO activity (revision_id, command) VALUES (?1, ?2)",
             params![self.revision_id, activity.command],
