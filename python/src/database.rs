@@ -2,16 +2,24 @@
 
 use std::path::PathBuf;
 
-use matdb::adopt::NewMaterials;
-use matdb::catalogue::exchange::Details;
+use matdb::adopt::{
+    CatalogueImport, CheckReport, DatabaseCheck, NewMaterials, Withdrawal, remove_materials,
+};
+use matdb::catalogue::exchange::{Details, Export, Format};
+use matdb::catalogue::{About, Citable, Credit, Diff, Rank, publish, references};
+use matdb::error::Error;
+use matdb::files::{folder_of, read_small, write_all};
 use matdb::material::{Slug, builtin};
-use matdb::report::MaterialSearch;
+use matdb::report::{
+    ExportReport, ExportRequest, MaterialSearch, NeighbourSearch, revision_records,
+};
 use matdb::setup::{self, find_material};
-use matdb::store::Store;
-use pyo3::exceptions::PyKeyError;
+use matdb::store::{Filter, Store};
+use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
+use serde_json::json;
 
-use crate::error::{MaterialError, raised};
+use crate::error::{MaterialError, UsageError, raised};
 use crate::json::to_python;
 use crate::material::Material;
 
@@ -131,7 +139,7 @@ impl Database {
                 .map(|added| format!("{}@{}", added.slug, added.added.revision()))
                 .collect())
         })
-        .map_err(raised::<matdb::error::Error>)
+        .map_err(raised::<Error>)
     }
 
     /// The materials with these words, the best first: a dictionary each, as `matdb search --json` prints.
@@ -139,6 +147,216 @@ impl Database {
     fn search<'py>(&self, py: Python<'py>, words: &str, most: u32) -> PyResult<Bound<'py, PyAny>> {
         let hits = py.detach(|| MaterialSearch { words, most }.run(&self.database()));
         to_python(py, &hits.map_err(raised)?)
+    }
+
+    /// The revisions of a material, oldest first: a dictionary each, as `matdb history --json` prints.
+    fn history<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        let records = py.detach(|| revision_records(name, &self.database()));
+        to_python(py, &records.map_err(raised)?)
+    }
+
+    /// What differs between two materials or revisions, as `matdb diff --json` prints it.
+    fn diff<'py>(&self, py: Python<'py>, before: &str, after: &str) -> PyResult<Bound<'py, PyAny>> {
+        let store = self.store()?;
+        let of = |name| find_material(store.as_ref(), name, "").map(|found| found.material);
+        let (before, after) = (of(before).map_err(raised)?, of(after).map_err(raised)?);
+        to_python(py, &py.detach(|| Diff::new(&before, &after)))
+    }
+
+    /// How to cite a material: `text`, `bibtex`, `csl`, and the `references` of its data.
+    fn cite<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        let store = self.store()?;
+        let found = find_material(store.as_ref(), name, "").map_err(raised)?;
+        let stored = found.stored(store.as_ref()).map_err(raised)?;
+        let credit = stored.as_ref().map_or(Credit::BuiltIn, Credit::of);
+        let year = stored.as_ref().and_then(|stored| credit.year(stored));
+        let material = &found.material;
+        let citable = Citable { material, revision: found.revision, year, credit };
+        let record = json!({
+            "text": citable.text(),
+            "bibtex": citable.bibtex(),
+            "csl": citable.csl(),
+            "references": references(material),
+        });
+        to_python(py, &record)
+    }
+
+    /// The materials nearest to the longest curve of a material, as `matdb near --json` prints them.
+    ///
+    /// Parameters
+    /// ----------
+    /// material : str
+    ///     `NAME` or `NAME@REVISION`.
+    /// measured_at_ghz : float, optional
+    ///     Frequency of the curve, GHz; that of its instrument unless stated.
+    /// shape : bool, default False
+    ///     Rank by shape, for a curve of unknown level.
+    /// most : int, default 10
+    ///     How many at most.
+    #[pyo3(signature = (material, *, measured_at_ghz = None, shape = false, most = 10))]
+    fn near<'py>(
+        &self,
+        py: Python<'py>,
+        material: &str,
+        measured_at_ghz: Option<f64>,
+        shape: bool,
+        most: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let report = py.detach(|| {
+            let store = Store::open_existing(&self.path)?;
+            let frequency_hz = measured_at_ghz.map(|ghz| ghz * 1e9);
+            let search = NeighbourSearch::of_material(material, frequency_hz, store.as_ref())?;
+            let rank = if shape { Rank::Shape } else { Rank::Level };
+            let is_refused = search.illumination.relative && !shape;
+            let filter = Filter::default();
+            (!is_refused).then(|| search.run(store.as_ref(), &filter, rank, most)).transpose()
+        });
+        let relative = "the levels of the curve are relative; rank by shape (shape=True)";
+        let report = report.map_err(raised::<Error>)?;
+        to_python(py, &report.ok_or_else(|| UsageError::new_err(relative))?)
+    }
+
+    /// Withdraws a material; it and its revisions stay. Returns the revision that says so.
+    ///
+    /// Parameters
+    /// ----------
+    /// name : str
+    /// reason : str
+    ///     Why, in a sentence.
+    /// superseded_by : str, optional
+    ///     Name of the material that replaces it.
+    #[pyo3(signature = (name, reason, *, superseded_by = None))]
+    fn withdraw(
+        &self,
+        name: String,
+        reason: String,
+        superseded_by: Option<String>,
+    ) -> PyResult<u32> {
+        let withdrawal = Withdrawal { name, reason, superseded_by };
+        let (_, revision) = withdrawal.store(&self.database()).map_err(raised)?;
+        Ok(revision)
+    }
+
+    /// Removes materials with all their revisions. Returns the number of revisions by name.
+    #[pyo3(signature = (*names))]
+    fn remove<'py>(&self, py: Python<'py>, names: Vec<String>) -> PyResult<Bound<'py, PyAny>> {
+        let removed = remove_materials(&names, &self.database()).map_err(raised)?;
+        to_python(py, &removed)
+    }
+
+    /// Writes a material to a file of another format. Returns the files and what the format cannot hold, as
+    /// `matdb export --json` prints it.
+    ///
+    /// Parameters
+    /// ----------
+    /// name : str
+    ///     `NAME` or `NAME@REVISION`.
+    /// path : str or os.PathLike
+    ///     The file; tables that belong to it get its name.
+    /// format : str
+    ///     `csv`, `universal-brdf`, `open-material`, `mitsuba` or `sionna`.
+    /// curve : str, optional
+    ///     Name of the curve of `csv`.
+    #[pyo3(signature = (name, path, *, format, curve = None))]
+    fn export<'py>(
+        &self,
+        py: Python<'py>,
+        name: &str,
+        path: PathBuf,
+        format: &str,
+        curve: Option<&str>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let format = match format {
+            "csv" => Format::Csv,
+            "universal-brdf" => Format::UniversalBrdf,
+            "open-material" => Format::OpenMaterial,
+            "mitsuba" => Format::Mitsuba,
+            "sionna" => Format::Sionna,
+            other => {
+                let known = "csv, universal-brdf, open-material, mitsuba and sionna";
+                let problem = format!("there is no format `{other}`; there are {known}");
+                return Err(PyValueError::new_err(problem));
+            }
+        };
+        let request = ExportRequest { material: name, format, curve, output: &path };
+        let export = py.detach(|| {
+            let store = Store::open_existing(&self.path)?;
+            let ExportReport { export, .. } = request.run(store.as_ref())?;
+            write_all(folder_of(&path), &export.files)?;
+            Ok(export)
+        });
+        let Export { files, lost } = export.map_err(raised::<Error>)?;
+        let written: Vec<PathBuf> =
+            files.iter().map(|(name, _)| path.with_file_name(name)).collect();
+        to_python(py, &json!({ "files": written, "lost": lost }))
+    }
+
+    /// Writes all materials as a static site with data, as `matdb publish` does. Returns what it says with `--json`.
+    ///
+    /// Parameters
+    /// ----------
+    /// folder : str or os.PathLike
+    /// about : str or os.PathLike, optional
+    ///     `about.toml` with title, people and licence; that of the publication there unless stated.
+    #[pyo3(signature = (folder, *, about = None))]
+    fn publish<'py>(
+        &self,
+        py: Python<'py>,
+        folder: PathBuf,
+        about: Option<PathBuf>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let published = py.detach(|| {
+            let Some(store) = Store::open_existing(&self.path)? else {
+                return Err(Error::NoDatabase { path: self.path.clone() });
+            };
+            let about = match &about {
+                None => About::of_publication(&folder).unwrap_or_default(),
+                Some(path) => {
+                    let text = String::from_utf8_lossy(&read_small(path)?).into_owned();
+                    About::parse(&path.display().to_string(), &text)?
+                }
+            };
+            Ok(publish(&store, &about, &folder, |_| ())?)
+        });
+        to_python(py, &published.map_err(raised::<Error>)?)
+    }
+
+    /// Verifies a published catalogue and adds all of what is new, or nothing. Returns what was done, as
+    /// `matdb import --json` prints it.
+    ///
+    /// Parameters
+    /// ----------
+    /// bundle : str or os.PathLike
+    ///     A published folder, or its `catalogue.sqlite`.
+    /// prefix : str, optional
+    ///     What stands before the names of materials that differ from those of the same name here.
+    /// dry_run : bool, default False
+    ///     Whether nothing is written.
+    #[pyo3(signature = (bundle, *, prefix = None, dry_run = false))]
+    fn import_catalogue<'py>(
+        &self,
+        py: Python<'py>,
+        bundle: PathBuf,
+        prefix: Option<&str>,
+        dry_run: bool,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let import = CatalogueImport { bundle: &bundle, prefix, dry_run };
+        let imported = py.detach(|| import.run(&self.database()));
+        to_python(py, &imported.map_err(raised)?)
+    }
+
+    /// Verifies the whole database and makes its fits again, as `matdb check --json` prints it. What is wrong is in
+    /// `findings`.
+    ///
+    /// Parameters
+    /// ----------
+    /// repair : bool, default False
+    ///     Whether what can be repaired is repaired first, after the file was copied.
+    #[pyo3(signature = (*, repair = false))]
+    fn check<'py>(&self, py: Python<'py>, repair: bool) -> PyResult<Bound<'py, PyAny>> {
+        let check = DatabaseCheck { repair };
+        let report: Result<CheckReport, _> = py.detach(|| check.run(&self.database(), &mut |_| ()));
+        to_python(py, &report.map_err(raised)?)
     }
 
     fn __repr__(&self) -> PyResult<String> {

@@ -1,5 +1,6 @@
 """The bindings: the bytes of the command line, arrays that fit them, errors, interruption, threads and memory."""
 
+import json
 import pickle
 import re
 import resource
@@ -181,3 +182,39 @@ def test_the_examples_of_the_pages_run(tmp_path, monkeypatch):
     assert len(examples) == 3
     for example in examples:
         exec(example, {})
+
+
+def test_a_database_says_and_does_what_the_command_line_does(scene, tmp_path):
+    db = md.open()
+    db.add("cotton", "ptfe", "steel", "mannequin-paint")
+
+    def said(*words):
+        done = command(tmp_path, *words, "--json", "-q")
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout)
+
+    assert db.history("cotton") == said("history", "cotton")
+    assert db.diff("cotton", "ptfe") == said("diff", "cotton", "ptfe")
+    assert db.cite("mannequin-paint") == said("cite", "mannequin-paint")
+    assert db.near("cotton", most=3) == said("near", "--material", "cotton", "--limit", "3")
+    assert db.check()["findings"] == []
+    exported = db.export("cotton", "cotton.csv", format="csv")
+    assert exported == said("export", "cotton", "--as", "csv", "-o", "cotton.csv")
+    assert db.withdraw("steel", "The plate was bent.", superseded_by="ptfe") == 2
+    assert db["steel"].to_dict()["status"]["is"] == "superseded"
+    published = db.publish("site")
+    assert published["materials"] == 4 and Path("site/index.html").exists()
+    other = md.open("other.sqlite")
+    planned = other.import_catalogue("site", dry_run=True)
+    assert planned["dry_run"] and not Path("other.sqlite").exists()
+    other.import_catalogue("site")
+    assert other.names() == db.names()
+    assert other.history("steel")[1]["activity"]["origin"]["revision"] == 2
+    assert other.remove("steel", "ptfe") == [{"slug": "steel", "revisions": 2}, {"slug": "ptfe", "revisions": 1}]
+    with pytest.raises(md.Error, match="`steel`"):
+        other.remove("steel")
+    with pytest.raises(ValueError, match="there is no format `xml`; there are csv"):
+        db.export("cotton", "cotton.xml", format="xml")
+    with pytest.raises(md.StoreError, match="none.sqlite"):
+        md.open("none.sqlite").publish("nowhere")
+    assert not Path("nowhere").exists()
