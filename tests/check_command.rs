@@ -48,7 +48,7 @@ fn a_sound_database_passes_and_nothing_is_missed_in_a_changed_one() {
         ("UPDATE fit_parameter SET sd = 7", "cotton@2", "`fit_parameter`"),
         ("UPDATE fit_parameter SET unit = 'furlong'", "cotton@2", "`fit_parameter`"),
         ("UPDATE entry SET kind = 'measured'", "matdb.sqlite", "what lists and searches say"),
-        ("DELETE FROM source WHERE revision_id = 1", "matdb.sqlite", "refers to a row"),
+        ("DELETE FROM source WHERE revision_id = 1", "matdb.sqlite", "refer to rows"),
     ] {
         let path = folder.path().join("matdb.sqlite");
         fs::write(&path, &sound).unwrap();

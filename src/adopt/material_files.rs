@@ -107,24 +107,27 @@ impl NewMaterials {
 impl AddedMaterial {
     fn new(material: &Material, added: Addition, store: &Store) -> AddedMaterial {
         let slug = material.slug.clone();
-        let before = match added {
-            // It is stored by now: a revision before that cannot be read is not an error.
-            Addition::Revision(number) => {
-                let before = store.revision_before(&slug, number).ok().flatten();
-                before.and_then(|before| store.get(&slug, Some(before)).ok().flatten())
-            }
-            Addition::New | Addition::Unchanged(_) | Addition::Repaired(_) => None,
-        };
-        let Some(before) = before else {
+        let Addition::Revision(number) = added else {
             return AddedMaterial { slug, added, differs: None, notice: None };
         };
-        let notice = match (before.material.status.sentence(), material.status.sentence()) {
-            (Some(said), None) => {
+        // It is stored by now: a revision before that cannot be read is not an error.
+        let before = store.revision_before(&slug, number).ok().flatten();
+        let before = before.and_then(|before| store.get(&slug, Some(before)).ok().flatten());
+        let is_active = material.status.sentence().is_none();
+        let said = before.as_ref().and_then(|before| before.material.status.sentence());
+        let notice = match said {
+            _ if !is_active => None,
+            Some(said) => {
                 Some(format!("{slug}: it was {said}; this revision makes it active again"))
             }
-            _ => None,
+            None if before.as_ref().is_none_or(|before| before.revision + 1 != number) => {
+                Some(format!(
+                    "{slug}: the revision before this one is lost or damaged; if that had withdrawn it, withdraw it again"
+                ))
+            }
+            None => None,
         };
-        let differs = Some(Diff::new(&before.material, material).line());
+        let differs = before.map(|before| Diff::new(&before.material, material).line());
         AddedMaterial { slug, added, differs, notice }
     }
 }

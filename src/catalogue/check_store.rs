@@ -75,8 +75,13 @@ impl StoreCheck<'_> {
                         Ok(())
                     }
                 };
-                if let Err(error) = done {
-                    (self.report)(problem(&name, error));
+                match done {
+                    Ok(()) => {}
+                    // This is the check that the error advises.
+                    Err(StoreError::Corrupt { problem: what, .. }) => {
+                        (self.report)(problem(&name, what));
+                    }
+                    Err(error) => (self.report)(problem(&name, error)),
                 }
             }
             Ok(())

@@ -11,7 +11,7 @@ use rusqlite::functions::FunctionFlags;
 use rusqlite::{Connection, ErrorCode, OpenFlags, Transaction, TransactionBehavior};
 use rusqlite_migration::{M, Migrations};
 
-use super::error::{InFile, StoreError};
+use super::error::{InFile, StoreError, is_damage, reason};
 use super::find::outline;
 use super::latest::{LATEST, LATEST_SCHEMA};
 use super::pages::{check_pages, stated_bytes, torn_revisions};
@@ -288,15 +288,41 @@ fn open_unchanged(path: &Path) -> Result<Connection, StoreError> {
             Err(StoreError::Log { file: path.to_owned(), log: beside(path, "-wal") })
         }
         result => {
-            result.in_file(path)?;
-            check_length(path, &conn)?;
-            if log_exists {
-                // It may be the log of another database, and its pages replace those of this one.
-                check_pages(&conn).in_file(path)?;
+            // It may be the log of another database, and its pages replace those of this one.
+            let result = result.and_then(|()| if log_exists { check_pages(&conn) } else { Ok(()) });
+            match result {
+                Err(error) if is_damage(&error) => return Err(damaged_at_once(path, error)?),
+                result => result.in_file(path)?,
             }
+            check_length(path, &conn)?;
             Ok(conn)
         }
     }
+}
+
+/// The error for a file whose pages cannot be read: its end is missing, or its log contradicts it.
+fn damaged_at_once(path: &Path, error: rusqlite::Error) -> Result<StoreError, StoreError> {
+    let (file, log) = (path.to_owned(), beside(path, "-wal"));
+    if log.symlink_metadata().is_ok_and(|found| found.len() > 0) {
+        return Ok(StoreError::OtherLog { file, log, problem: reason(&error) });
+    }
+    let bytes = size_bytes(path)?;
+    Ok(match said_bytes(path) {
+        Some(said) if u64::try_from(said).is_ok_and(|said| said > bytes) => {
+            StoreError::CutOff { file, bytes, said }
+        }
+        _ => StoreError::new(path, error),
+    })
+}
+
+/// The length that the header of a file states (sqlite.org/fileformat.html, "The Database Header").
+fn said_bytes(path: &Path) -> Option<i64> {
+    let mut header = [0; 32];
+    fs::File::open(path).ok()?.read_exact(&mut header).ok()?;
+    let page = u16::from_be_bytes([header[16], header[17]]);
+    let page_bytes = if page == 1 { 65536 } else { i64::from(page) };
+    let pages = u32::from_be_bytes([header[28], header[29], header[30], header[31]]);
+    Some(page_bytes * i64::from(pages))
 }
 
 /// Opens a file that this user may not write and that has no log. A log created for reading would stay, with this user

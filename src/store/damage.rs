@@ -20,11 +20,7 @@ pub(super) fn damage(conn: &Connection) -> Result<Vec<String>> {
         }
         found => found?,
     };
-    let dangling = rows(conn, "PRAGMA foreign_key_check", [], |row| {
-        let (table, parent): (String, String) = (row.get(0)?, row.get(2)?);
-        Ok(format!("a row of `{table}` refers to a row of `{parent}` that is not there"))
-    });
-    let dangling = match dangling {
+    let dangling = match dangling(conn) {
         Err(error) if is_damage(&error) => {
             vec![format!("references cannot be checked to the end: {}", reason(&error))]
         }
@@ -46,6 +42,28 @@ pub(super) fn damage(conn: &Connection) -> Result<Vec<String>> {
     })?;
     problems.extend(stale(conn)?.iter().map(|slug| problem(slug)));
     Ok(problems)
+}
+
+/// Rows that refer to others that are not there, a sentence for each pair of tables and for each material.
+fn dangling(conn: &Connection) -> Result<Vec<String>> {
+    let sql = "SELECT slug, current_revision FROM material AS own WHERE NOT EXISTS
+                   (SELECT 1 FROM revision WHERE material_id = own.id AND number = current_revision)
+               ORDER BY slug";
+    let mut found = rows(conn, sql, [], |row| {
+        let (slug, number): (String, u32) = (row.get(0)?, row.get(1)?);
+        Ok(format!("`{slug}` is there, but its revision {number} is not"))
+    })?;
+    let pairs = rows(conn, "PRAGMA foreign_key_check", [], |row| {
+        let (table, parent): (String, String) = (row.get(0)?, row.get(2)?);
+        Ok(format!("rows of `{table}` refer to rows of `{parent}` that are not there"))
+    })?;
+    for pair in pairs {
+        // Materials have been named.
+        if !found.contains(&pair) && !pair.starts_with("rows of `material` refer") {
+            found.push(pair);
+        }
+    }
+    Ok(found)
 }
 
 /// Materials with fewer revisions than the greatest number says, as a sentence each.

@@ -103,6 +103,20 @@ pub enum StoreError {
         /// Name of the trigger.
         name: String,
     },
+    /// The file and its log contradict each other.
+    #[error(
+        "{} and its log {} contradict each other: {problem}; if it is the log of another database, move it away, else \
+         bring both back from a copy",
+        file.display(), log.display()
+    )]
+    OtherLog {
+        /// The file.
+        file: PathBuf,
+        /// Its log.
+        log: PathBuf,
+        /// What was noticed.
+        problem: String,
+    },
     /// The number of its schema is wrong.
     #[error(
         "{} says that it has schema {said}, but its {object} is of a later one; bring the file back from a copy",

@@ -118,11 +118,19 @@ pub(super) fn has_its_number(
 pub(super) fn check(conn: &Connection, revision_id: i64, slug: &Slug, number: u32) -> Result<()> {
     match changed(conn, revision_id, slug, number)?.as_slice() {
         [] => Ok(()),
+        [Part::Number, ..] if !has_record(conn, revision_id)? => Err(damaged(format!(
+            "the record of revision {number} of `{slug}` is lost, and with it the proof of its name and number"
+        ))),
         changed => Err(damaged(format!(
             "revision {number} of `{slug}` has another {} than was stored",
             listed(changed)
         ))),
     }
+}
+
+fn has_record(conn: &Connection, revision_id: i64) -> Result<bool> {
+    let sql = "SELECT EXISTS (SELECT 1 FROM record WHERE revision_id = ?1)";
+    conn.query_row(sql, [revision_id], |row| row.get(0))
 }
 
 /// Parts in words.

@@ -415,9 +415,12 @@ fn lost_current_revision(tx: &Transaction, slug: &Slug) -> Result<Vec<String>> {
         let is_confirmed = material.status.superseded_by().is_none()
             && status.as_deref() == Some(material.status.as_str());
         if !is_confirmed {
+            let known =
+                status.map_or(String::new(), |status| format!(", which lists call {status}"));
             return Err(read::damaged(format!(
-                "its revision {lost} is lost, and may have had another status than revision {number}, the latest that is \
-                 sound; add the material again"
+                "its revision {lost} is lost{known}, and revision {number}, the latest that is sound, is {}; add the \
+                 material again, with the status that it should have",
+                material.status.as_str()
             )));
         }
         // An origin is that of the content.

@@ -13,12 +13,12 @@ pub enum Addition {
     Revision(u32),
     /// It equals the current revision, which has this number.
     Unchanged(u32),
-    /// It has the hash of the current revision, which has this number. The rows were damaged and have been rewritten.
+    /// It has the hash of a revision, which has this number. The rows were damaged and have been rewritten.
     Repaired(u32),
 }
 
 impl Addition {
-    /// The revision that is current now, from 1.
+    /// The revision that has the content, from 1: the current one, but where an earlier one was repaired.
     pub fn revision(self) -> u32 {
         match self {
             Addition::New => 1,

@@ -41,8 +41,8 @@ impl<'a> MaterialWriter<'a> {
     }
 
     /// Adds a material, or a revision of it, with its activity, and reads it back.
-    /// Does not add the content of the current revision again. Rewrites its rows where they are damaged: the stored
-    /// hash shows that they had this content. A damaged record gets this activity.
+    /// Does not add the content of the current revision again. Rewrites rows where they are damaged, those of an earlier
+    /// revision, too: the stored hash shows that they had this content. A damaged record gets this activity.
     pub fn add(&mut self, material: &Material, activity: Option<&Activity>) -> Result<Addition> {
         let tx = self.tx;
         let content_hash = material.content_hash();
@@ -59,6 +59,9 @@ impl<'a> MaterialWriter<'a> {
                 (Addition::Repaired(number), material_id)
             }
             Some(current) => {
+                if let Some(number) = repaired_earlier(tx, material, &content_hash, activity)? {
+                    return Ok(Addition::Repaired(number));
+                }
                 let number = next_number(tx, &current)?;
                 let made = revision(tx, material, number, &content_hash, activity)?;
                 (Addition::Revision(number), made)
@@ -243,6 +246,34 @@ fn is_intact(tx: &Transaction, material: &Material, current: &Current, hash: &st
         && read_back(tx, material, hash).is_ok())
 }
 
+/// Rewrites an earlier revision that has the hash of a material and is damaged, and returns its number.
+fn repaired_earlier(
+    tx: &Transaction,
+    material: &Material,
+    hash: &str,
+    activity: Option<&Activity>,
+) -> Result<Option<u32>> {
+    let slug = &material.slug;
+    let of_content =
+        read::revision_rows(tx, slug)?.into_iter().filter(|row| row.content_hash == hash);
+    for row in of_content {
+        let changed = record::changed(tx, row.id, slug, row.number)?;
+        let is_sound = match read::get_in(tx, slug, Some(row.number)) {
+            Err(error) if !is_damage(&error) => return Err(error),
+            stored => stored.is_ok_and(|stored| {
+                stored.is_some_and(|stored| stored.material.content_hash() == hash)
+            }),
+        };
+        if changed.contains(&Part::Number) || changed.is_empty() && is_sound {
+            continue;
+        }
+        restore_record(tx, row.id, (slug, row.number), activity)?;
+        rewrite(tx, row.id, material)?;
+        return Ok(Some(row.number));
+    }
+    Ok(None)
+}
+
 /// Replaces the damaged parts of a record: the command and the origin by those of `by`, the date by
 /// that of now, not above those of later revisions, and the program by this one. Returns the parts.
 ///
@@ -379,10 +410,12 @@ fn revision(
     let material_id: i64 = tx
         .prepare_cached(upsert)?
         .query_row(params![material.slug.as_str(), number], |row| row.get(0))?;
-    // A clock may be wrong: no revision is older than an earlier one.
+    // A lost revision has left rows under its number. A clock may be wrong: no revision is older than an earlier one.
     let insert = format!(
-        "INSERT INTO revision ({CONTENT}, material_id, number, content_hash, program_version, added_at)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, max({NOW},
+        "INSERT INTO revision ({CONTENT}, material_id, number, content_hash, program_version, id, added_at)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 1 + max(
+             coalesce((SELECT max(id) FROM revision), 0),
+             coalesce((SELECT max(revision_id) FROM record), 0)), max({NOW},
              coalesce((SELECT max(added_at) FROM revision WHERE material_id = ?), '')))"
     );
     let own: [Value; 5] = [
