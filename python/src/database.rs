@@ -37,7 +37,7 @@ impl Database {
         Store::open_existing(&self.path).map_err(raised)
     }
 
-    fn database(&self) -> setup::Database {
+    pub(crate) fn database(&self) -> setup::Database {
         setup::Database::new(Some(&self.path))
     }
 }

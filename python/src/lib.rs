@@ -6,9 +6,11 @@
 mod command;
 mod database;
 mod error;
+mod fit;
 mod interrupt;
 mod json;
 mod material;
+mod measure;
 mod scan;
 mod scene;
 
@@ -26,7 +28,11 @@ mod _matdb {
         Error, FileError, MaterialError, RenderError, SceneError, StoreError, UsageError,
     };
     #[pymodule_export]
+    use crate::fit::{Fit, fit};
+    #[pymodule_export]
     use crate::material::Material;
+    #[pymodule_export]
+    use crate::measure::{Measurement, measure};
     #[pymodule_export]
     use crate::scan::{Scan, View, render};
     #[pymodule_export]

@@ -1,6 +1,8 @@
 //! A material.
 
-use matdb::brdf::Scattering;
+use std::f64::consts::PI;
+
+use matdb::brdf::{Brdf, Scattering};
 use matdb::setup::MaterialRevision;
 use numpy::{PyArray1, PyArrayLike1};
 use pyo3::prelude::*;
@@ -18,6 +20,20 @@ impl Material {
     pub(crate) fn new(found: MaterialRevision) -> Material {
         Material { found }
     }
+}
+
+/// Backscatter of a law at angles in degrees, dB.
+pub(crate) fn sigma0_db<'py>(
+    py: Python<'py>,
+    law: &Brdf,
+    theta_deg: &PyArrayLike1<'py, f64, numpy::AllowTypeChange>,
+) -> Bound<'py, PyArray1<f64>> {
+    let level_db = |theta_deg: &f64| {
+        let theta_rad = theta_deg.to_radians();
+        let retro_per_sr = law.retro_per_sr(theta_rad);
+        10.0 * (4.0 * PI * retro_per_sr * theta_rad.cos().powi(2)).log10()
+    };
+    PyArray1::from_iter(py, theta_deg.as_array().iter().map(level_db))
 }
 
 #[pymethods]
@@ -80,16 +96,7 @@ impl Material {
         theta_deg: PyArrayLike1<'py, f64, numpy::AllowTypeChange>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let law = self.found.material.scattering().map_err(raised)?;
-        let theta_deg = theta_deg.as_array();
-        let values = theta_deg.iter().map(|theta_deg| {
-            let theta_rad = theta_deg.to_radians();
-            10.0 * (4.0
-                * std::f64::consts::PI
-                * law.retro_per_sr(theta_rad)
-                * theta_rad.cos().powi(2))
-            .log10()
-        });
-        Ok(PyArray1::from_iter(py, values))
+        Ok(sigma0_db(py, &law, &theta_deg))
     }
 
     /// All that is known of it, as `matdb show --json` prints it.

@@ -26,6 +26,14 @@ impl Scene {
         Ok(Scene { text, path: path.to_owned(), scene })
     }
 
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    pub(crate) fn scene(&self) -> &scene::Scene {
+        &self.scene
+    }
+
     /// This scene with other values: `radar__spot__rays` stands for `rays` under `[radar.spot]`.
     pub(crate) fn with(&self, py: Python<'_>, changes: &Bound<'_, PyDict>) -> PyResult<Scene> {
         let unreadable = |error: toml::de::Error| UsageError::new_err(error.to_string());

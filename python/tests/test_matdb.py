@@ -173,15 +173,57 @@ def test_memory_does_not_grow(scene):
     assert kilobytes() - before < 8_000, "200 renders of 40 kB of files each"
 
 
+def examples():
+    root = Path(__file__).parent.parent.parent
+    pages = [(root / page).read_text() for page in ["python/README.md", "docs/python.md"]]
+    found = [example for page in pages for example in re.findall(r"```python\n(.*?)```", page, re.DOTALL)]
+    assert len(found) == 4
+    return found
+
+
 def test_the_examples_of_the_pages_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    root = Path(__file__).parent.parent.parent
-    examples = []
-    for page in ["python/README.md", "docs/python.md"]:
-        examples += re.findall(r"```python\n(.*?)```", (root / page).read_text(), re.DOTALL)
-    assert len(examples) == 3
-    for example in examples:
+    for example in examples():
         exec(example, {})
+
+
+def test_a_fit_is_that_of_the_command_line(scene, tmp_path):
+    fitted = md.fit("cotton", seed=3)
+    done = command(tmp_path, "fit", "cotton", "--seed", "3", "--json", "-q")
+    said = json.loads(done.stdout)
+    assert {key: said[key] for key in fitted.to_dict()} == fitted.to_dict()
+    assert said["sentences"] == fitted.verdict
+    levels = fitted.sigma0_db(np.linspace(0, 60, 5))
+    assert levels.shape == (5,) and np.all(np.diff(levels) < 0)
+    held = md.fit("cotton", fixed={"diffuse.alpha": 4.0})
+    assert held.parameters["diffuse.alpha"] == 4.0
+    with pytest.raises(md.Error, match="the model has no parameter `alpha`"):
+        md.fit("cotton", fixed={"alpha": 4.0})
+    with pytest.raises(ValueError, match="there is no method `guess`"):
+        md.fit("cotton", method="guess")
+
+
+def test_a_measurement_is_that_of_the_command_line(scene, tmp_path):
+    md.render(scene).save("out")
+    measured = md.measure("out/cloud.ply", scene)
+    measured.save("by-hand")
+    done = command(tmp_path, "measure", "out/cloud.ply", "--scene", "plate.toml", "-o", "by-command", "-q")
+    assert done.returncode == 0, done.stderr
+    assert files("by-hand") == files("by-command")
+    assert len(measured) == len(measured.theta_deg) == len(measured.sigma0_db) == len(measured.threshold_db) == 144
+    assert np.isfinite(measured.sigma0_db).sum() > 100
+    fitted = md.fit("by-hand/curve.csv", model="lambert")
+    assert set(fitted.parameters) == {"albedo"}
+    with pytest.raises(md.Error, match="`nowhere`"):
+        md.measure("out/cloud.ply", scene, region="nowhere")
+
+
+def test_types_are_those_that_the_stubs_say(tmp_path):
+    for number, example in enumerate(examples()):
+        (tmp_path / f"example_{number}.py").write_text(example)
+    for words in [["mypy", "--strict", *(str(path) for path in tmp_path.glob("*.py"))], ["mypy.stubtest", "matdb"]]:
+        done = subprocess.run([sys.executable, "-m", *words], cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_a_database_says_and_does_what_the_command_line_does(scene, tmp_path):
