@@ -25,6 +25,7 @@ __all__ = [
     "View",
     "__version__",
     "_run",
+    "diagnose",
     "fit",
     "load_scene",
     "measure",
@@ -208,5 +209,14 @@ class Scan:
     def save(self, folder: _Name) -> None: ...
     def _repr_png_(self) -> bytes: ...
 
+def diagnose(
+    cloud: _Name,
+    scene: _Name,
+    folder: _Name,
+    *,
+    db: Database | None = None,
+    seed: int = 0,
+    controls: bool = True,
+) -> _Record: ...
 def render(scene: Scene, *, db: Database | None = None, seed: int | None = None) -> Scan: ...
 def _run(words: Sequence[str]) -> int: ...

@@ -5,6 +5,7 @@
 
 mod command;
 mod database;
+mod diagnose;
 mod error;
 mod fit;
 mod interrupt;
@@ -23,6 +24,8 @@ mod _matdb {
     use crate::command::_run;
     #[pymodule_export]
     use crate::database::{Database, open};
+    #[pymodule_export]
+    use crate::diagnose::diagnose;
     #[pymodule_export]
     use crate::error::{
         Error, FileError, MaterialError, RenderError, SceneError, StoreError, UsageError,

@@ -177,7 +177,7 @@ def examples():
     root = Path(__file__).parent.parent.parent
     pages = [(root / page).read_text() for page in ["python/README.md", "docs/python.md"]]
     found = [example for page in pages for example in re.findall(r"```python\n(.*?)```", page, re.DOTALL)]
-    assert len(found) == 4
+    assert len(found) == 5
     return found
 
 
@@ -216,6 +216,20 @@ def test_a_measurement_is_that_of_the_command_line(scene, tmp_path):
     assert set(fitted.parameters) == {"albedo"}
     with pytest.raises(md.Error, match="`nowhere`"):
         md.measure("out/cloud.ply", scene, region="nowhere")
+
+
+def test_a_diagnosis_is_that_of_the_command_line(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    md.render(md.load_scene("builtin:concealed")).save("out")
+    why = md.diagnose("out/cloud.ply", "builtin:bench", "why", controls=False)
+    assert [effect["name"] for effect in why["effects"]] == ["foreign-patch"]
+    words = ["diagnose", "out/cloud.ply", "--scene", "builtin:bench", "-o", "by-command", "--no-controls", "--json", "-q"]
+    done = command(tmp_path, *words)
+    assert json.loads(done.stdout) == why
+    assert Path("why/report.html").exists()
+    with pytest.raises(md.Error, match="nothing.ply"):
+        md.diagnose("nothing.ply", "builtin:bench", "nowhere")
+    assert not Path("nowhere").exists()
 
 
 def test_types_are_those_that_the_stubs_say(tmp_path):

@@ -12,10 +12,10 @@ use crate::effects::{About, Antenna, BeamSpot, Effect, RangeCell, SecondBounce, 
 use crate::error::Error;
 use crate::files::folder_of;
 use crate::measure::{Cloud, CloudError};
-use crate::radar::{Pattern, RadarError, Receiver, Returns};
+use crate::radar::{Pattern, Radar, RadarError, Receiver, Returns};
 use crate::report::{Choice, Measurands, Reason};
 use crate::scene::{Scene, read_text};
-use crate::setup::{ReadyScene, antenna};
+use crate::setup::{ReadyScene, absolute, antenna};
 use crate::store::Store;
 use crate::units::ratio_from_db;
 
@@ -292,6 +292,26 @@ impl CheckedRequest<'_> {
     /// The scene of every cloud.
     pub fn scenes(&self) -> impl Iterator<Item = &ReadyScene> {
         [&self.ready].into_iter().chain(self.further.iter().map(|one| &one.ready))
+    }
+
+    /// The clouds of the request, one for each scene, as `read` reads them.
+    ///
+    /// # Errors
+    /// Those of `read`; powers of an unknown level; a scan that holds only chirps that were detected.
+    pub fn read_clouds(
+        &self,
+        read: impl Fn(&Path, &Radar) -> Result<Cloud, Error>,
+    ) -> Result<Vec<Cloud>, Error> {
+        let read_one = |(path, ready): (&Path, &ReadyScene)| {
+            if ready.scene.chirps.only_detected {
+                return Err(Error::usage(
+                    format!("the scan of {} holds only chirps that were detected", path.display()),
+                    "a diagnosis needs the silent ones: give the scene the whole scan, and set radar.scan.complete",
+                ));
+            }
+            absolute(read(path, ready.scene.radar())?, path)
+        };
+        self.request.clouds().zip(self.scenes()).map(read_one).collect()
     }
 
     /// Diagnoses the clouds, one for each scene; `hear` receives in a few words what is being done.

@@ -7,11 +7,10 @@ use glam::DVec3;
 use crate::error::Error;
 use crate::formats::ColumnNames;
 use crate::frames::{Global, Point, Pose};
-use crate::material::Scale;
-use crate::measure::{Cloud, CloudError, CloudReading, PowerUnit, Start};
+use crate::measure::{Cloud, CloudReading, PowerUnit, Start};
 use crate::radar::Radar;
 use crate::report::shell_word;
-use crate::setup::{read_cloud, read_pose};
+use crate::setup::{absolute, read_cloud, read_pose};
 
 /// A cloud file and what it does not say of itself.
 #[derive(Debug, clap::Args)]
@@ -100,18 +99,11 @@ impl CloudArgs {
         columns: &ColumnArgs,
         radar: &Radar,
     ) -> Result<Cloud, Error> {
-        let cloud = self.read_another(path, columns, radar)?;
-        match cloud.scale {
-            Scale::Absolute => Ok(cloud),
-            Scale::Relative => {
-                let error = CloudError::Relative;
-                Err(Error::Cloud { file: path.to_owned(), error })
-            }
-        }
+        absolute(self.read_another(path, columns, radar)?, path)
     }
 
     /// Reads another cloud by the same flags.
-    fn read_another(
+    pub fn read_another(
         &self,
         path: &Path,
         columns: &ColumnArgs,

@@ -9,7 +9,8 @@ use crate::error::Error;
 use crate::files::read_whole;
 use crate::formats::PointFormat;
 use crate::frames::{Global, Pose};
-use crate::measure::{Cloud, CloudReading};
+use crate::material::Scale;
+use crate::measure::{Cloud, CloudError, CloudReading};
 
 /// Reads a measured cloud; the ending of its name says the [format](PointFormat).
 ///
@@ -24,6 +25,17 @@ pub fn read_cloud(path: &Path, reading: &CloudReading) -> Result<Cloud, Error> {
     };
     let cloud = reading.read(format, &read_whole(path)?);
     cloud.map_err(|error| Error::Cloud { file: path.to_owned(), error })
+}
+
+/// A cloud whose powers are known.
+///
+/// # Errors
+/// Powers of an unknown level.
+pub fn absolute(cloud: Cloud, path: &Path) -> Result<Cloud, Error> {
+    match cloud.scale {
+        Scale::Absolute => Ok(cloud),
+        Scale::Relative => Err(Error::Cloud { file: path.to_owned(), error: CloudError::Relative }),
+    }
 }
 
 /// Reads the pose of a `pose.json`, as `matdb measure` writes it.

@@ -80,17 +80,7 @@ fn diagnose(
     for notice in checked.choice.notices() {
         console.notice(&notice);
     }
-    let mut clouds = Vec::new();
-    for (path, ready) in checked.request.clouds().zip(checked.scenes()) {
-        let chirps = &ready.scene.chirps;
-        if chirps.only_detected {
-            return Err(Error::usage(
-                format!("the scan of {} holds only chirps that were detected", path.display()),
-                "a diagnosis needs the silent ones: give the scene the whole scan, and set radar.scan.complete",
-            ));
-        }
-        clouds.push(cloud.read_absolute(path, columns, ready.scene.radar())?);
-    }
+    let clouds = checked.read_clouds(|path, radar| cloud.read_another(path, columns, radar))?;
     for notice in clouds.iter().flat_map(|cloud| &cloud.notices).chain(notices) {
         console.notice(notice);
     }
