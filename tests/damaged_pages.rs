@@ -1,7 +1,8 @@
 //! Promise: of a damaged database a command either prints what it prints of the sound one, or ends with status 1 and one
-//! sentence. `list` may also call a material damaged, and `show` leave out the list of revisions. `check` finds damage wherever the answer of another command
-//! changes or fails. A command that only reads changes nothing. A command that writes loses nothing that could be read
-//! before, and a damaged database never replaces a published site.
+//! sentence. Lists and searches may also call a material damaged, `near` leave it out with a notice, and `show` leave out
+//! the list of revisions. `check` finds damage wherever the answer of another command changes or fails. A command that
+//! only reads changes nothing. A command that writes loses nothing that could be read before, and a damaged database never
+//! replaces a published site.
 //!
 //! The number of a case selects the kind of damage and seeds it, so that a case can be tried again:
 //! `MATDB_TEST_FAULT=17`. A sample of the cases; `.ci/long faults` tries them all.
@@ -116,7 +117,8 @@ impl Answer {
                 && self.files == sound.files
                 && (is_listed()
                     || self.is_right_json(sound)
-                    || self.is_right_but_for_history(sound))
+                    || self.is_right_but_for_history(sound)
+                    || self.is_near_without_damaged(sound))
     }
 
     /// Whether it is the JSON of a list that calls some materials damaged, or of a revision without the list of all.
@@ -124,8 +126,15 @@ impl Answer {
         let json = |answer: &Answer| serde_json::from_slice::<serde_json::Value>(&answer.stdout);
         let (Ok(own), Ok(mut sound)) = (json(self), json(sound)) else { return false };
         if let (Some(own), Some(sound)) = (own.as_array(), sound.as_array()) {
+            // Ranks are comparable only within one search.
+            let without_rank = |hit: &serde_json::Value| {
+                let mut hit = hit.clone();
+                hit.as_object_mut().and_then(|hit| hit.remove("rank"));
+                hit
+            };
             let is_right = |(own, sound): (&serde_json::Value, &serde_json::Value)| {
-                own == sound || own["damaged"] == true && own["slug"] == sound["slug"]
+                without_rank(own) == without_rank(sound)
+                    || own["damaged"] == true && own["slug"] == sound["slug"]
             };
             return own.len() == sound.len() && own.iter().zip(sound).all(is_right);
         }
@@ -134,6 +143,35 @@ impl Answer {
             sound["history"] = serde_json::Value::Null;
             own == sound
         }
+    }
+
+    /// Whether it has the nearest materials without damaged ones, which a notice names, and others in their places.
+    fn is_near_without_damaged(&self, sound: &Answer) -> bool {
+        let end = "` is damaged and is left out";
+        let notices = self.stderr.lines().filter(|line| line.contains(end));
+        let named = notices.filter_map(|line| line.split('`').nth(1));
+        let damaged: Vec<&str> = named.collect();
+        let rows = |answer: &Answer| -> Vec<String> {
+            let json = serde_json::from_slice::<serde_json::Value>(&answer.stdout);
+            let listed = json.ok().and_then(|json| json["materials"].as_array().cloned());
+            match listed {
+                Some(materials) => materials.iter().map(ToString::to_string).collect(),
+                None => answer.text().lines().skip(1).map(str::to_owned).collect(),
+            }
+        };
+        let is_damaged = |row: &String| {
+            damaged.iter().any(|name| {
+                row.contains(&format!("\"slug\":\"{name}\""))
+                    || row.starts_with(&format!("{name} "))
+            })
+        };
+        let squeezed = |row: &String| row.split_whitespace().collect::<Vec<_>>().join(" ");
+        let own: Vec<String> = rows(self).iter().map(squeezed).collect();
+        let kept =
+            |row: &&String| !is_damaged(row) && !row.contains("left out") && !row.trim().is_empty();
+        !damaged.is_empty()
+            && !rows(self).iter().any(is_damaged)
+            && rows(sound).iter().filter(kept).all(|row| own.contains(&squeezed(row)))
     }
 
     /// Whether it shows a revision without the list of all, and says so.

@@ -22,10 +22,7 @@ pub(super) fn stale_lines(conn: &Connection, filter: &Filter) -> Result<Vec<Stri
         return check_filter(conn, filter);
     }
     // No index is read, and what is damaged elsewhere hides nothing.
-    let sql = "SELECT slug FROM material WHERE slug NOT IN (SELECT slug FROM entry)
-               AND slug <> '' AND slug NOT GLOB '*[^a-z0-9-]*'";
-    let left_out: Vec<String> = rows(conn, sql, [], |row| row.get(0))?;
-    left_out.first().map_or(Ok(()), |slug| Err(damaged(problem(slug))))?;
+    ENTRIES.check_whole(conn)?;
     ENTRIES.readable_stale(conn)
 }
 
@@ -42,6 +39,7 @@ pub(super) fn stale_outlines(conn: &Connection, filter: &Filter) -> Result<Vec<S
         return Ok(Vec::new());
     }
     let mut stale = check_filter(conn, filter)?;
+    refuse_first(conn, "SELECT slug FROM material WHERE slug NOT IN (SELECT slug FROM outline)")?;
     stale.extend(damaged_of(conn, outline::stale(conn)?.changed)?);
     Ok(stale)
 }
@@ -49,12 +47,15 @@ pub(super) fn stale_outlines(conn: &Connection, filter: &Filter) -> Result<Vec<S
 /// A table of lists or searches, with the query of the materials of which it says something else than what is stored.
 struct Lines {
     table: &'static str,
+    /// A condition under which a material has no line.
+    left_out: Option<&'static str>,
     /// Its argument is a condition on the materials, which begins with `WHERE`.
     stale: fn(&str) -> String,
 }
 
 const ENTRIES: Lines = Lines {
     table: "entry",
+    left_out: Some("slug NOT IN (SELECT slug FROM entry)"),
     stale: |wanted| {
         format!(
             "SELECT slug FROM (
@@ -69,6 +70,8 @@ const ENTRIES: Lines = Lines {
 
 const TAGS: Lines = Lines {
     table: "entry_tag",
+    // A material need not have a tag.
+    left_out: None,
     stale: |wanted| {
         format!(
             "SELECT slug FROM (SELECT * FROM entry_tag_made {wanted} EXCEPT SELECT * FROM entry_tag)
@@ -80,6 +83,7 @@ const TAGS: Lines = Lines {
 
 const TEXTS: Lines = Lines {
     table: "search",
+    left_out: Some("id NOT IN (SELECT rowid FROM search)"),
     stale: |wanted| {
         format!(
             "SELECT slug FROM (SELECT * FROM search_made {wanted} EXCEPT SELECT rowid, * FROM search)
@@ -113,6 +117,13 @@ impl Lines {
         Ok(all)
     }
 
+    /// Fails where a material has no line, a damaged one, too: a list would leave it out without a word.
+    fn check_whole(&self, conn: &Connection) -> Result<()> {
+        self.left_out.map_or(Ok(()), |condition| {
+            refuse_first(conn, &format!("SELECT slug FROM material WHERE {condition}"))
+        })
+    }
+
     /// Fails where the pages or indexes of the table are damaged.
     fn check_pages(&self, conn: &Connection) -> Result<()> {
         renew_search(conn);
@@ -138,9 +149,18 @@ fn check(conn: &Connection, tables: &[Lines]) -> Result<Vec<String>> {
 fn stale_of(conn: &Connection, tables: &[Lines]) -> Result<Vec<String>> {
     let mut stale = Vec::new();
     for table in tables {
+        table.check_whole(conn)?;
         stale.extend(damaged_of(conn, table.readable_stale(conn)?)?);
     }
     Ok(stale)
+}
+
+/// Fails with the first material of a query, one without a line.
+fn refuse_first(conn: &Connection, sql: &str) -> Result<()> {
+    // A material without a proper name has none.
+    let sql = format!("{sql} AND slug <> '' AND slug NOT GLOB '*[^a-z0-9-]*'");
+    let left_out: Vec<String> = rows(conn, &sql, [], |row| row.get(0))?;
+    left_out.first().map_or(Ok(()), |slug| Err(damaged(problem(slug))))
 }
 
 /// Those materials that are damaged themselves: a repair leaves what lists say of them as it was. Fails where one is
