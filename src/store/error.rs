@@ -141,7 +141,7 @@ pub enum StoreError {
         /// Its log.
         log: PathBuf,
     },
-    /// A log holds what was written last, and cannot be read without another file beside it.
+    /// A log holds what was written last, and cannot be read without another file next to it.
     #[error(
         "{} holds what was written last to {} and cannot be read where no file can be made next to it; copy both to a \
          folder that you may write",
@@ -155,7 +155,7 @@ pub enum StoreError {
     },
     /// No name is free for one more copy of a damaged file.
     #[error(
-        "{} was not repaired: {copies} copies of earlier repairs lie beside it; move some away",
+        "{} was not repaired: {copies} copies of earlier repairs lie next to it; move some away",
         file.display()
     )]
     Copies {

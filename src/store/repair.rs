@@ -24,7 +24,7 @@ const MOST_TRIED_APART: usize = 10;
 /// The command that is recorded with what a repair writes.
 const COMMAND: &str = "check --repair";
 
-/// Most copies of a database that repairs leave beside it.
+/// Most copies of a database that repairs leave next to it.
 const MOST_COPIES: u32 = 99;
 
 /// Result of [`Store::repair`], a sentence each.
@@ -39,7 +39,7 @@ pub struct Repair {
 }
 
 impl Store {
-    /// Repairs what can be repaired, in one transaction, after a copy of the file was written beside it.
+    /// Repairs what can be repaired, in one transaction, after a copy of the file was written next to it.
     /// Rebuilds indexes, views, units, lists, searches and statistics from the content of revisions. Rewrites a
     /// revision with damaged content if one of `at_hand` has its hash. Restores the lost row of a material from its
     /// row in the lists, if the content then has the stored hash. Where the current revision of a material is lost,
