@@ -21,7 +21,7 @@ use crate::json::to_python;
 /// cloud : str or os.PathLike
 ///     The measured cloud, with a row of each detection.
 /// scene : str or os.PathLike
-///     The scene that was measured: a file, or `builtin:NAME`.
+///     The file of the scene that was measured.
 /// folder : str or os.PathLike
 ///     Where `report.html`, `report.json` and the scene with what was found are written.
 /// db : Database, optional

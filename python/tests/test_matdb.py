@@ -221,14 +221,15 @@ def test_a_measurement_is_that_of_the_command_line(scene, tmp_path):
 def test_a_diagnosis_is_that_of_the_command_line(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     md.render(md.load_scene("builtin:concealed")).save("out")
-    why = md.diagnose("out/cloud.ply", "builtin:bench", "why", controls=False)
+    Path("bench.toml").write_text(md.load_scene("builtin:bench").text)
+    why = md.diagnose("out/cloud.ply", "bench.toml", "why", controls=False)
     assert [effect["name"] for effect in why["effects"]] == ["foreign-patch"]
-    words = ["diagnose", "out/cloud.ply", "--scene", "builtin:bench", "-o", "by-command", "--no-controls", "--json", "-q"]
+    words = ["diagnose", "out/cloud.ply", "--scene", "bench.toml", "-o", "by-command", "--no-controls", "--json", "-q"]
     done = command(tmp_path, *words)
     assert json.loads(done.stdout) == why
     assert Path("why/report.html").exists()
     with pytest.raises(md.Error, match="nothing.ply"):
-        md.diagnose("nothing.ply", "builtin:bench", "nowhere")
+        md.diagnose("nothing.ply", "bench.toml", "nowhere")
     assert not Path("nowhere").exists()
 
 
