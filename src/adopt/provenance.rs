@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::files::{FilesError, WayOut, read_whole};
 use crate::material::{Activity, Citation, Input, Material, Source, SourceKind};
+use crate::scene::builtin;
 
 /// A file that was read: its name without its folder, and the BLAKE3 hash of its bytes.
 pub fn input(path: &Path, bytes: &[u8]) -> Input {
@@ -18,6 +19,10 @@ pub fn input(path: &Path, bytes: &[u8]) -> Input {
 pub fn activity(command: &str, paths: &[&Path]) -> Result<Activity, FilesError> {
     let mut inputs = Vec::new();
     for path in paths {
+        if let Some(text) = builtin::name(path).and_then(builtin::text) {
+            inputs.push(input(path, text.as_bytes()));
+            continue;
+        }
         let bytes = read_whole(path).map_err(|error| FilesError {
             way_out: WayOut::Words("leave the command's files where they are while it runs"),
             ..error
@@ -67,4 +72,18 @@ pub(super) fn free_key<'a>(key: &str, known: impl Iterator<Item = &'a String>) -
         number += 1;
     }
     free
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_built_in_scene_is_an_input_like_a_file() {
+        let activity = activity("diagnose", &[Path::new("builtin:bench")]).unwrap();
+        let text = builtin::text("bench").unwrap();
+        assert_eq!(activity.inputs, [input(Path::new("builtin:bench"), text.as_bytes())]);
+        let missing = super::activity("diagnose", &[Path::new("builtin:none")]).unwrap_err();
+        assert!(missing.to_string().contains("builtin:none"), "{missing}");
+    }
 }

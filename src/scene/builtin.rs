@@ -1,5 +1,7 @@
 //! Scenes that are part of the program: three calibration targets in front of the paper's radar, and mannequins.
 
+use std::path::Path;
+
 /// Names and texts.
 pub const SCENES: [(&str, &str); 7] = [
     ("bench", include_str!("../../scenes/bench.toml")),
@@ -16,10 +18,13 @@ pub fn text(name: &str) -> Option<&'static str> {
     SCENES.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
 }
 
+/// The name of the built-in scene that a path means, `builtin:NAME`, whether or not there is one.
+pub fn name(path: &Path) -> Option<&str> {
+    path.to_str()?.strip_prefix("builtin:")
+}
+
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
     use crate::scene::Scene;
 

@@ -10,7 +10,7 @@ use crate::formats::text::nearest;
 
 /// Reads a scene file's text, or that of a built-in scene, `builtin:NAME`.
 pub fn read_text(path: &Path) -> Result<String, SceneError> {
-    if let Some(name) = path.to_str().and_then(|path| path.strip_prefix("builtin:")) {
+    if let Some(name) = builtin::name(path) {
         return builtin::text(name).map(str::to_owned).ok_or_else(|| unknown(path, name));
     }
     let size = std::fs::metadata(path).map_or(0, |found| found.len());

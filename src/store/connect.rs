@@ -291,7 +291,10 @@ fn open_unchanged(path: &Path) -> Result<Connection, StoreError> {
             // It may be the log of another database, and its pages replace those of this one.
             let result = result.and_then(|()| if log_exists { check_pages(&conn) } else { Ok(()) });
             match result {
-                Err(error) if is_damage(&error) => return Err(damaged_at_once(path, error)?),
+                Err(error) if is_damage(&error) => {
+                    drop(conn);
+                    return Err(damaged_at_once(path, error)?);
+                }
                 result => result.in_file(path)?,
             }
             check_length(path, &conn)?;
@@ -315,7 +318,8 @@ fn damaged_at_once(path: &Path, error: rusqlite::Error) -> Result<StoreError, St
     })
 }
 
-/// The length that the header of a file states (sqlite.org/fileformat.html, "The Database Header").
+/// The length that the header of a file states (sqlite.org/fileformat.html, "The Database Header"). Reading the file
+/// past SQLite ends the locks that this process has on it.
 fn said_bytes(path: &Path) -> Option<i64> {
     let mut header = [0; 32];
     fs::File::open(path).ok()?.read_exact(&mut header).ok()?;
