@@ -4,7 +4,7 @@ import sys
 
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
-from scipy.special import gammainc
+from scipy.special import gammainc, gammaincc
 
 import effects
 import generate
@@ -101,7 +101,6 @@ def noise():
     expected = physics.FALSE_ALARM * n
     say("false alarms of empty gates, standard deviations off", abs(alarm.sum() - expected) / np.sqrt(expected), 3)
     # censoring of an echo that has the threshold's own mean: a sum of four exponentials
-    from scipy.special import gammaincc
     mean = physics.mw(physics.THRESHOLD_DBM) - level
     seen, _, _ = physics.detect(rng, np.full(n, mean), np.zeros(n), np.full(n, 8.0), f, level)
     say("share of detections at the threshold against Gamma(4)", abs(np.isfinite(seen).mean() - gammaincc(4, 4)), 0.005)
@@ -249,9 +248,9 @@ def strengths():
         before = untouched(name)
         use, power = audible(before), before.means_mw()[0]
         found = effects.calibrate(lambda: untouched(name), "angle-error", "weak", 1, 4)
-        truth = {"detections": int(use.sum()), "false_alarms": 0, "speckle": "independent", "labels": ["angle-error"], "looks": 4,
-                 "tilt_spread_db": generate.tilt_spread_db(before, found.size, use)}
-        gain = score.expected_gain(truth, "")["angle-error"]
+        truth = {"detections": int(use.sum()), "false_alarms": 0, "labels": ["angle-error"], "looks": 4, "declared_looks": 4,
+                 "independent_share": 1.0, "tilt_spread_db": generate.tilt_spread_db(before, found.size, use)}
+        gain = score.expected_gain(truth)["angle-error"]
         say(f"{name}: gain in ln p that counts as in the data, over that of a weak angle-error, {gain:.1f}", score.IN_THE_DATA / gain, 1)
         for strength, loss in effects.OWN_DB["compression"].items():
             s = untouched(name)
@@ -267,6 +266,67 @@ def strengths():
         nats = np.sum(share * np.log(np.maximum(100 * share, 1e-12)))
         say(f"compression by {ratio}: nats of the scatter against a histogram, off as a share",
             abs(nats / effects.ceiling_divergence(ratio, 4) - 1), 0.03)
+
+
+def seen_divergence(true_mw, base_mw):
+    """Nats by which Gamma of four looks shows another mean, with noise, where what is below the threshold is silent."""
+    noise = physics.mean_noise_mw(4)
+    true, base = true_mw + noise, base_mw + noise
+    u, v = (4 * physics.mw(physics.THRESHOLD_DBM) / mean for mean in (true, base))
+    echo = 4 * (gammaincc(4, u) * np.log(base / true) + (true / base - 1) * gammaincc(5, u))
+    return np.minimum(echo + gammainc(4, u) * np.log(gammainc(4, u) / gammainc(4, v)), refit.MOST)
+
+
+def realised(name, label, found, draws):
+    """Realised gains over draws of the noise, and the last of the truths, all that an expected gain needs."""
+    before, state, rng, out = untouched(name), untouched(name), np.random.default_rng(8), []
+    effects.EFFECTS[label](state, found.size, np.random.default_rng(7))
+    alone = state.means_mw()[0]
+    for _ in range(draws):
+        if label == "angle-error":  # whose tilts are noise as well
+            effects.angle_error(state, found.size, rng)
+        data = generate.observe(rng, state, False)
+        out.append(generate.realised_gain(data, before, alone, label, found, 0.0, 1.0))
+    truth = {"labels": [label], "detections": int(data.seen.sum()), "false_alarms": int(data.alarm.sum()),
+             "looks": state.looks, "declared_looks": 4, "independent_share": 1.0, "power_gain": {label: found.gain},
+             "range_gain": generate.range_gain(before, data.range_m, data.echo)}
+    if label == "angle-error":
+        truth["tilt_spread_db"] = generate.tilt_spread_db(before, found.size, data.echo)
+    return np.array(out), truth, alone
+
+
+def gains():
+    """Realised gains against what is expected, and of effects of size 0."""
+    for name, label in (("groove", "drift"), ("vase", "foreign-patch"), ("cylinder", "subsurface"), ("body", "thin-film"),
+                        ("groove", "motion"), ("box", "subsurface")):
+        found = effects.calibrate(lambda: untouched(name), label, "weak", 7, 4)
+        out, truth, alone = realised(name, label, found, 200)
+        nats, loud, error = seen_divergence(alone, found.law_mw), audible(untouched(name)), np.std(out) / len(out) ** 0.5
+        whole, expected, what = nats.sum() + truth["range_gain"], score.expected_gain(truth)[label], f"{name}: weak {label}"
+        say(f"{what}, mean realised gain {out.mean():.1f} against {whole:.1f} by divergences, standard errors off",
+            abs(out.mean() - whole) / error, 3)
+        say(f"{what}, what noise and silences change of the expected gain, {expected:.1f}, where an echo was loud, as a share",
+            abs((nats[loud].sum() + truth["range_gain"]) / expected - 1), 0.2)
+        if name != "box":  # some of whose chirps are audible by the effect alone, and gain much each
+            say(f"{what}, sd of the realised gain against the root of twice its mean, off as a share",
+                abs(np.std(out) / np.sqrt(2 * out.mean()) - 1), 0.2)
+    names, law = ("angle-error", "compression", "speckle"), refit.Law(untouched("groove"))
+    own = {name: effects.calibrate(lambda: untouched("groove"), name, "weak", 7, 4) for name in names}
+    for label, found, draws, low, high in (
+        ("speckle", own["speckle"]._replace(size=3.0), 200, 0.9, 1.1), ("speckle", own["speckle"], 200, 0.5, 1.0),
+        ("angle-error", own["angle-error"], 20, 1.0, 1.6), ("compression", own["compression"], 20, 0.9, 1.1),
+    ):
+        out, truth, _ = realised("groove", label, found, draws)
+        ratio = out / score.expected_gain(truth)[label]
+        mean, error = ratio.mean(), np.std(ratio) / draws**0.5
+        say(f"groove: {label} of size {found.size:.3g}, mean realised gain over the expected one, {mean:.2f}, "
+            f"standard errors outside of {low} to {high}", max(low - mean, mean - high, 0) / error, 2)
+    law_mw = law.means_mw(effects.refitted(law, untouched("groove")).numbers)
+    for label in effects.EFFECTS:
+        if label not in ("finite-spot", "noise-floor"):  # a spot has a size, and alarms are counted as they are
+            size = {"compression": 1e-9, "speckle": 4.0}.get(label, 0.0)
+            out = realised("groove", label, effects.Sized(size, 0.0, 0.0, law_mw), 1)[0]
+            say(f"groove: realised gain of {label} of size 0", abs(out[0]), 0.01)
 
 
 def laws():
@@ -388,6 +448,7 @@ if __name__ == "__main__":
     numbers()
     shapes()
     strengths()
+    gains()
     laws()
     refits()
     spots()

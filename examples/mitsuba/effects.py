@@ -291,7 +291,8 @@ class Sized(NamedTuple):
 
     size: float
     left_db: float
-    gain: float = 0.0
+    gain: float
+    law_mw: np.ndarray  # mean powers by the refitted law
 
 
 def refitted(law, after):
@@ -375,15 +376,19 @@ def fitted_numbers(before, after, name, use, looks):
     return out
 
 
-def ceiling_divergence(ratio, looks):
-    """Kullback-Leibler divergence, nats, of an echo whose looks a ceiling compresses from the echo of Gamma with its mean.
+def ceiling_cells(ratio):
+    """Echo whose looks a ceiling compresses: its share in each cell of power, their middles in cells, and the width of a cell
+    over the ceiling. `ratio` is the mean of each look before over the ceiling. The looks' cells are convolved."""
+    cells, looks = 4096, len(ratio)
+    edge = np.linspace(0, np.tanh(np.sqrt(40 * max(ratio))) ** 2, cells + 1)  # of the ceiling
+    look = -np.diff(np.exp(-(np.arctanh(np.minimum(np.sqrt(edge), 1 - 1e-15)) ** 2) / np.reshape(ratio, (-1, 1))))
+    share = np.maximum(np.fft.irfft(np.prod(np.fft.rfft(look, looks * cells), 0), looks * cells), 0)
+    return share / share.sum(), np.arange(looks * cells) + looks / 2, edge[1] / looks
 
-    `ratio` is the mean before over the ceiling. By cells of the power of a look, convolved over the looks."""
-    cells = 4096
-    edge = np.linspace(0, np.tanh(np.sqrt(40 * ratio)) ** 2, cells + 1)  # of the ceiling
-    look = -np.diff(np.exp(-(np.arctanh(np.minimum(np.sqrt(edge), 1 - 1e-15)) ** 2) / ratio))
-    share = np.maximum(np.fft.irfft(np.fft.rfft(look, looks * cells) ** looks, looks * cells), 0)
-    share, middle = share / share.sum(), np.arange(looks * cells) + looks / 2
+
+def ceiling_divergence(ratio, looks):
+    """Kullback-Leibler divergence, nats, of an echo whose looks a ceiling compresses from the echo of Gamma with its mean."""
+    share, middle, _ = ceiling_cells([ratio] * looks)
     of_gamma = np.diff(gammainc(looks, looks * np.append(middle - 0.5, middle[-1] + 0.5).clip(0) / (share @ middle)))
     full = share > 1e-14
     return float(share[full] @ np.log(share[full] / np.maximum(of_gamma[full], 1e-300)))
@@ -410,13 +415,18 @@ def looks_for(declared, excess_db):
     return high
 
 
-def excess_scatter_db(state, size, count=64):
-    """Sd over tilts of this size of the mean power of each chirp, dB; `count` draws."""
-    rng, drawn, levels = np.random.default_rng(0), copy.copy(state), []
+def tilted_mw(state, size, count):
+    """Mean power of each chirp with `count` tilts of this size."""
+    rng, drawn, powers = np.random.default_rng(0), copy.copy(state), []
     for _ in range(count):
         angle_error(drawn, size, rng)
-        levels.append(physics.db(drawn.means_mw()[0]))
-    return np.std(levels, 0, ddof=1)
+        powers.append(drawn.means_mw()[0])
+    return np.array(powers)
+
+
+def excess_scatter_db(state, size, count=64):
+    """Sd over tilts of this size of the mean power of each chirp, dB; `count` draws."""
+    return np.std(physics.db(tilted_mw(state, size, count)), 0, ddof=1)
 
 
 def tilts_for(state, excess_db):
@@ -453,7 +463,8 @@ def calibrate(make, name, strength, seed, looks):
         size, law, after = own_size(make(), name, OWN_DB[name][strength], looks), refit.Law(make()), make()
         EFFECTS[name](after, size, np.random.default_rng(seed))
         whole = refitted(law, after)
-        return Sized(float(size), whole.rms_db(), whole.loss(looks) + lost_scatter(law, after, looks))
+        lost = whole.loss(looks) + lost_scatter(law, after, looks)
+        return Sized(float(size), whole.rms_db(), lost, law.means_mw(whole.numbers))
     goal, start, law = RMS_DB[strength], START.get(name, 1e-2), refit.Law(make())
 
     def fit(size, draft=False):
@@ -467,7 +478,7 @@ def calibrate(make, name, strength, seed, looks):
 
     def found(size):
         whole = fit(size)
-        return Sized(float(size), whole.rms_db(), whole.loss(looks))
+        return Sized(float(size), whole.rms_db(), whole.loss(looks), law.means_mw(whole.numbers))
 
     # the first crossing on the way up: a ceiling over everything leaves nothing again
     low = best = start

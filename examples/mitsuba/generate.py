@@ -11,6 +11,7 @@ import numpy as np
 
 import diagnoses
 import effects
+import evidence
 import physics
 import refit
 import scan
@@ -160,22 +161,6 @@ range_sd_m = {physics.RANGE_SD_M}
         file.write(text)
 
 
-def add_looks(rng, looks, w0, state, shared):
-    """Fields of the looks; a broken number of looks is one weak look among whole ones of the same total."""
-    whole = int(np.ceil(looks))
-    fields = physics.speckle(rng, whole, w0, state.surface, state.piece, shared)
-    if whole == looks:
-        return fields
-    # weights 1, ..., 1, b of intensities with (sum)^2 / sum of squares = looks
-    n = whole - 1
-    low, high = 0.0, 1.0
-    for _ in range(60):
-        b = (low + high) / 2
-        low, high = (b, high) if (n + b) ** 2 / (n + b * b) < looks else (low, b)
-    weight = np.array([1.0] * n + [b]) if n else np.array([1.0])
-    return fields * np.sqrt(weight / weight.mean())[:, None]
-
-
 @functools.lru_cache
 def load(name, pattern="once"):
     """A base. What the chirps meet is stored for the scan `once`; for others Mitsuba traces it."""
@@ -219,7 +204,7 @@ def range_gain(before, ranges, use):
 @functools.lru_cache
 def generator():
     """Digest of what a case depends on besides its plan."""
-    files = ["build_bases", "effects", "generate", "physics", "refit", "scan", "sets", "target_state", "targets"]
+    files = ["build_bases", "effects", "evidence", "generate", "physics", "refit", "scan", "sets", "target_state", "targets"]
     bases = [os.path.relpath(path, HERE) for path in sorted(glob.glob(f"{HERE}/bases/*.npz"))]
     return diagnoses.digest(HERE, [f"{name}.py" for name in files] + bases)
 
@@ -252,34 +237,58 @@ def make(out, plan):
     return truth
 
 
+def disturbed(name, plan, indices):
+    """A target with effects of a plan, by their places in it."""
+    state = untouched(name, plan)
+    for index in indices:
+        size = calibrated(name, plan, index).size
+        effects.EFFECTS[plan.labels[index]](state, size, np.random.default_rng(plan.draw(index)))
+    return state
+
+
+def observe(rng, state, shared):
+    """What a scan reports of a target."""
+    power, share = state.means_mw()
+    hit = state.range_m > 0
+    delta2 = state.delta(np.where(hit, state.range_m, physics.FOCUS_M)) ** 2
+    steady = share * delta2 / (state.material["m"] ** 2 + delta2)
+    weights = physics.look_weights(state.looks or LOOKS)
+    fields = physics.speckle(rng, len(weights), state.w0, state.surface, state.piece, shared) * np.sqrt(weights)[:, None]
+    ranges = np.where(hit, state.range_m + getattr(state, "echo_shift", 0), 0)
+    noise = physics.mean_noise_mw(LOOKS) * state.noise_gain
+    report = physics.detect(rng, power, steady, ranges, fields, noise, state.ceiling_mw)
+    return evidence.Observed(state, power, steady, ranges, noise, report)
+
+
+def realised_gain(data, before, alone, label, found, level, share):
+    """Gain in ln p of what was observed, by the true form of an effect over the law refitted without it; others stay.
+
+    `alone` are the mean powers with this effect alone, `share` is that of independent chirps."""
+    law = found.law_mw
+    left_out = np.divide(law, alone, out=np.ones_like(law), where=alone > 0)
+    without = np.where((alone > 0) | (law == 0), data.power_mw * left_out, law * physics.mw(level))
+    gain = data.gain(label, found.size, without, LOOKS)
+    if label in ("angle-error", "noise-floor"):  # which share no speckle
+        return gain
+    return share * gain + (data.range_gain(before) if label in ("motion", "pose") else 0.0)
+
+
 def case(out, plan):
     """Writes a case, and returns its truth."""
     number, labels, shared, speckle_mm = plan.number, plan.labels, plan.is_shared(), plan.waist_mm()
     name = plan.base or choose(plan)
     rng = np.random.default_rng([plan.seed, number])
-    w0 = physics.waist_m(speckle_mm)
-    before = untouched(name, plan)
-    state, sizes = untouched(name, plan), {}
-    for index, label in enumerate(labels):
-        found = calibrated(name, plan, index)
-        effects.EFFECTS[label](state, found.size, np.random.default_rng(plan.draw(index)))
-        sizes["unknown" if label in effects.UNKNOWN else label] = found
+    before, state = untouched(name, plan), disturbed(name, plan, range(len(labels)))
+    sizes = {"unknown" if n in effects.UNKNOWN else n: calibrated(name, plan, i) for i, n in enumerate(labels)}
     level = float(rng.normal(0, plan.level_sd))
-    power, share = state.means_mw()
-    power = power * physics.mw(level)
+    state.gain = state.gain * physics.mw(level)
     if state.ceiling_mw is not None:
         state.ceiling_mw *= physics.mw(level)
         state.numbers["compression"] = [{"saturation_dbm": float(physics.db(state.ceiling_mw))}]
-    safe = np.where(state.range_m > 0, state.range_m, physics.FOCUS_M)
-    delta2 = (physics.WAVELENGTH_M / (2 * np.pi * physics.beam_width_m(w0, safe))) ** 2
-    steady = share * delta2 / (targets.MATERIALS[name]["m"] ** 2 + delta2)
-    looks = state.looks or LOOKS
-    fields = add_looks(rng, looks, w0, state, shared)
     declared_noise = physics.mean_noise_mw(LOOKS)
     if "noise-floor" in labels:  # the power above the declared one
         state.numbers["noise-floor"] = [{"level_dbm": float(physics.db(declared_noise * (state.noise_gain - 1)))}]
-    ranges = np.where(state.range_m > 0, state.range_m + getattr(state, "echo_shift", 0), 0)
-    seen, where, alarm = physics.detect(rng, power, steady, ranges, fields, declared_noise * state.noise_gain, state.ceiling_mw)
+    data = observe(rng, state, shared)
     folder = os.path.join(out, f"case-{number:03d}")
     os.makedirs(os.path.join(out, "meshes"), exist_ok=True)
     os.makedirs(folder, exist_ok=True)
@@ -290,14 +299,14 @@ def case(out, plan):
     slug = f"judge-{number:03d}"
     start = write_material(os.path.join(folder, "material"), slug, targets.MATERIALS[name], rng)
     write_scene(os.path.join(folder, "scene.toml"), name, slug, len(parts), plan, LOOKS)
-    write_cloud(os.path.join(folder, "cloud.ply"), seen, where, state.ray, state.aim)
-    hit, echo = state.range_m > 0, np.isfinite(seen) & ~alarm
-    fitted = {}
-    for index, label in enumerate(labels):
-        if label in effects.FITTED:  # of this effect alone
-            alone = untouched(name, plan)
-            effects.EFFECTS[label](alone, sizes[label].size, np.random.default_rng(plan.draw(index)))
-            fitted[label] = effects.fitted_numbers(before, alone, label, echo & (before.range_m > 0), LOOKS)
+    write_cloud(os.path.join(folder, "cloud.ply"), data.seen_dbm, data.seen_m, state.ray, state.aim)
+    share = evidence.independent_share(state.aim, state.w0) if shared and labels else 1.0
+    fitted, realised = {}, {}
+    for index, (label, found) in enumerate(sizes.items()):
+        alone = disturbed(name, plan, [index])
+        realised[label] = realised_gain(data, before, alone.means_mw()[0], label, found, level, share)
+        if label in effects.FITTED:
+            fitted[label] = effects.fitted_numbers(before, alone, label, data.echo & (before.range_m > 0), LOOKS)
     truth = {
         "base": name, "labels": list(sizes), "strength": plan.strength if labels else None,
         "kind": next((n for n in labels if n in effects.UNKNOWN), None),
@@ -305,17 +314,18 @@ def case(out, plan):
         "numbers": state.numbers | fitted,
         "left_after_refit_db": {label: found.left_db for label, found in sizes.items()},
         "power_gain": {label: found.gain for label, found in sizes.items()},
+        "realised_gain": realised, "independent_share": share,
         "reaches_strength": reaches(name, plan),
         "level_offset_db": level, "speckle": f"shared, w0 = {speckle_mm} mm" if shared else "independent",
-        "looks": float(looks), "declared_looks": LOOKS,
-        "noise_dbm": float(physics.db(declared_noise * state.noise_gain)),
-        "chirps": state.n, "hits": int(hit.sum()), "detections": int(np.isfinite(seen).sum()), "false_alarms": int(alarm.sum()),
-        "silent_share_of_hits": float(np.mean(~np.isfinite(seen[before.range_m > 0]))),
-        "range_gain": range_gain(before, ranges, echo), "rays": rays_file(plan.scan),
+        "looks": float(state.looks or LOOKS), "declared_looks": LOOKS, "noise_dbm": float(physics.db(data.noise_mw)),
+        "chirps": state.n, "hits": int(np.sum(state.range_m > 0)),
+        "detections": int(data.seen.sum()), "false_alarms": int(data.alarm.sum()),
+        "silent_share_of_hits": float(np.mean(~data.seen[before.range_m > 0])),
+        "range_gain": range_gain(before, data.range_m, data.echo),
         "law": {k: v for k, v in targets.MATERIALS[name].items()}, "start": start,
     }
     if "angle-error" in labels:
-        truth["tilt_spread_db"] = tilt_spread_db(state, sizes["angle-error"].size, echo)
+        truth["tilt_spread_db"] = tilt_spread_db(state, sizes["angle-error"].size, data.echo)
     return truth
 
 

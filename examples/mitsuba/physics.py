@@ -112,6 +112,14 @@ def below_ceiling(power, ceiling):
     return ceiling * np.tanh(np.sqrt(np.multiply.outer(power, looks) / ceiling)) ** 2 @ weight
 
 
+def look_weights(looks):
+    """A broken number of looks is one weak look among whole ones: weights 1, ..., 1, b, (sum)^2 / sum of squares = looks."""
+    n = int(np.ceil(looks)) - 1
+    b = (n - np.sqrt(n * (n - (looks - 1) * (looks - n)))) / (looks - 1) if n else 1.0
+    weights = np.array([1.0] * n + [b])
+    return weights / weights.mean()
+
+
 def speckle(rng, looks, w0, where, piece, shared):
     """Complex fields of unit mean intensity, one row a look.
 

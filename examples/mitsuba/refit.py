@@ -57,6 +57,12 @@ class Law:
         rows = self.law.at(self.law.lobes, met, self.delta[use])
         return CubicSpline(physics.LN_WIDTH, np.log(rows * self.scale[use] * (np.cos(met) / np.cos(theta)) ** 6))
 
+    def means_mw(self, numbers):
+        """Mean power of every chirp by the law's four numbers; 0 where it hits nothing."""
+        lobe, rest, wider, power = numbers[:4]
+        whole = np.exp(lobe + self.ln_lobe(wider)) + self.rest * np.exp(rest + power * self.ln_cos)
+        return np.where(self.power_mw > 0, whole, 0.0)
+
     def fit(self, power_mw, use, gains=(), shape=None):
         """The best fit, by the likelihood of Gamma, to powers of the chirps in use. A gain is that of each chirp, dB per unit."""
         true, rest, ln_cos = np.log(np.maximum(power_mw[use], 1e-30)), self.rest[use], self.ln_cos[use]

@@ -3,7 +3,6 @@
 import argparse
 import collections
 import concurrent.futures
-import csv
 import functools
 import json
 import math
@@ -13,24 +12,8 @@ import diagnoses
 from intervals import intervals
 
 
-IN_THE_DATA = 5.0  # gain in ln p below which not even the true form can be seen
-FALSE_ALARM = 3e-4  # declared, of a gate without an echo
+IN_THE_DATA = 5.0  # realised gain in ln p below which not even the true form can be seen
 LEFT_DB = {"strong": 1.33, "moderate": 0.665, "weak": 0.33}
-
-
-@functools.lru_cache
-def independent_share(rays, w0):
-    """Chirps with speckle of their own among all: 1/sum of exp(-2 d^2/w0^2) over the aims at the target plane z = 0."""
-    cells, total = collections.defaultdict(list), 0.0
-    with open(rays) as file:
-        for row in csv.DictReader(file):
-            way = -float(row["oz_m"]) / float(row["dz"])
-            x, y = (float(row[f"o{a}_m"]) + way * float(row[f"d{a}"]) for a in "xy")
-            cells[int(x // (2.5 * w0)), int(y // (2.5 * w0))].append((x, y))
-    for (i, j), mine in cells.items():
-        near = [p for a in (i - 1, i, i + 1) for b in (j - 1, j, j + 1) for p in cells.get((a, b), [])]
-        total += sum(math.exp(-2 * ((x - u) ** 2 + (y - v) ** 2) / w0**2) for x, y in mine for u, v in near)
-    return sum(map(len, cells.values())) / total
 
 
 @functools.lru_cache
@@ -50,12 +33,9 @@ def divergence(true_looks, sd, looks):
     return step * sum(x * (math.log(x) - log_density(u - mean, looks)) for u, x in inside)
 
 
-def expected_gain(truth, folder):
-    """Gain in ln p that the true form of each effect has over the refitted base, from the truth alone."""
-    echoes, looks = truth["detections"] - truth["false_alarms"], truth.get("declared_looks", 4)
-    share = 1.0
-    if truth["speckle"].startswith("shared"):
-        share = independent_share(os.path.join(folder, truth.get("rays", "rays.csv")), float(truth["speckle"].split()[-2]) / 1000)
+def expected_gain(truth):
+    """Gain in ln p that the true form of each effect is expected to have over the refitted base, from the truth alone."""
+    echoes, looks, share = truth["detections"] - truth["false_alarms"], truth["declared_looks"], truth["independent_share"]
     out = {}
     for label in truth["labels"]:
         if label == "speckle":
@@ -64,18 +44,16 @@ def expected_gain(truth, folder):
             # every chirp has a tilt of its own, which neighbours that share a speckle show the better: at least this
             spread = [s * math.log(10) / 10 for s in truth["tilt_spread_db"]]  # nepers of power
             out[label] = echoes * sum(divergence(looks, s, looks) for s in spread) / len(spread)
-        elif label == "noise-floor":  # by its false alarms alone, which share no speckle
-            empty = truth["chirps"] - truth["hits"] * (1 - truth["silent_share_of_hits"])
-            count, declared = truth["false_alarms"], max(empty, 1) * FALSE_ALARM
-            out[label] = count * math.log(count / declared) - count + declared if count > declared else 0.0
+        elif label == "noise-floor":  # a count that is there
+            out[label] = truth["realised_gain"][label]
         else:
             out[label] = share * truth["power_gain"][label]
             if label in ("motion", "pose"):  # which the ranges show as well
-                out[label] += truth.get("range_gain", 0.0)
+                out[label] += truth["range_gain"]
     return out
 
 
-def judge(answer, truth, gains):
+def judge(answer, truth):
     """What kind of case it is, whether the answer is right, and the names that were said."""
     said = [e["name"] for e in answer.get("effects", [])]
     labels, verdict = truth["labels"], answer["verdict"]
@@ -90,12 +68,12 @@ def judge(answer, truth, gains):
         if not truth["reaches_strength"]:
             left = truth["left_after_refit_db"][labels[0]]
             kind = next((k for k in list(LEFT_DB)[list(LEFT_DB).index(kind):] if left >= LEFT_DB[k]), "below weak")
-    return "not in the data" if min(gains.values()) < IN_THE_DATA else kind, good, said
+    return "not in the data" if min(truth["realised_gain"].values()) < IN_THE_DATA else kind, good, said
 
 
-def outcome(case, truth, answer, gains):
+def outcome(case, truth, answer):
     """What became of a case: all that a score counts, as JSON can hold it."""
-    kind, good, said = judge(answer, truth, gains)
+    kind, good, said = judge(answer, truth)
     return {
         "case": case, "kind": kind, "right": bool(good), "truth": "+".join(truth["labels"]) or "none",
         "names": bool(said), "said": "+".join(said) or answer["verdict"], "seconds": answer.get("seconds"),
@@ -103,7 +81,7 @@ def outcome(case, truth, answer, gains):
         "intervals": [
             f"{case} {truth['base']}: interval of {name}: {value:.4g} +- {sd:.2g}, truth {true:.4g}"
             for name, value, sd, true, holds in intervals(answer, truth) if not holds],
-        "words": in_words(case, truth, answer, gains, said) if not good or kind == "not in the data" else "",
+        "words": in_words(case, truth, answer, said) if not good or kind == "not in the data" else "",
     }
 
 
@@ -160,19 +138,20 @@ class Score:
         for line in self.misses:
             print(" ", line)
         if self.apart:
-            print(f"not in the data (the true form itself is expected to gain less than {IN_THE_DATA:g} in ln p):")
+            print(f"not in the data (on these very data the true form itself gains less than {IN_THE_DATA:g} in ln p):")
             for line in self.apart:
                 print(" ", line)
 
 
-def in_words(case, truth, answer, gains, said):
+def in_words(case, truth, answer, said):
     left = ", ".join(f"{u.get('covariate')} {u.get('strength_db') or 0:.2f} dB" for u in answer.get("unexplained", []))
     words = "" if said or left else f" [{answer.get('reason') or answer['words'][-200:]}]"
-    gain = ", ".join(f"{v:.1f} for {g}" for g, v in gains.items()) or "none"
+    expected = expected_gain(truth)
+    gain = ", ".join(f"{v:.1f} for {g}, expected {expected[g]:.1f}" for g, v in truth["realised_gain"].items()) or "none"
     if set(truth["labels"]) & {"finite-spot", "multi-bounce"}:
-        gain += f", by ranges {truth.get('range_gain', 0.0):.0f} more"
+        gain += f", by ranges {truth['range_gain']:.0f} more"
     return (f"{case} {truth['base']} {'+'.join(truth['labels']) or 'none'} ({truth['strength']}, {truth.get('kind')}, "
-            f"{truth['speckle']}, level {truth['level_offset_db']:+.1f} dB; expected gain {gain}): "
+            f"{truth['speckle']}, level {truth['level_offset_db']:+.1f} dB; realised gain {gain}): "
             f"{answer['verdict']}, said {'+'.join(said) or 'nothing'}; left: {left or 'nothing'}{words}")
 
 
@@ -197,7 +176,7 @@ def main():
     for name, answer in zip(names, answers):
         with open(os.path.join(truths, f"{name}.json")) as file:
             truth = json.load(file)
-        score.add(outcome(name, truth, answer, expected_gain(truth, folder)))
+        score.add(outcome(name, truth, answer))
     score.print()
     if arguments.strict and (not names or score.right != score.total):
         raise SystemExit(1)

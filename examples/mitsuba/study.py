@@ -74,7 +74,7 @@ def scored(folder, index, seed, program, record):
             answer = diagnoses.kept(program.key, case, 0) if truth else None
             if not answer:
                 continue
-            record.outcomes[name] = score.outcome(name, truth, answer, score.expected_gain(truth, out))
+            record.outcomes[name] = score.outcome(name, truth, answer)
         done += 1
         result.add(record.outcomes[name])
     return result, done
