@@ -375,11 +375,25 @@ fn every_command_has_help_with_an_example() {
         "rm",
         "export",
         "completions",
+        "man",
     ] {
         let output = matdb(folder.path()).args(["help", command]).output().unwrap();
         let text = String::from_utf8(output.stdout).unwrap();
         assert!(text.contains("Example") && text.contains(&format!("matdb {command}")), "{text}");
     }
+}
+
+#[test]
+fn every_command_has_a_man_page() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = matdb(folder.path()).args(["man", "-o", "man1", "--json"]).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let said: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let files = said["files"].as_array().unwrap();
+    assert_eq!(files.len(), entries(&folder.path().join("man1")).len());
+    assert!(files.len() > 25 && files.contains(&"matdb.1".into()), "{said}");
+    let page = std::fs::read_to_string(folder.path().join("man1/matdb-render.1")).unwrap();
+    assert!(page.contains("matdb\\-render") && page.contains("uncompressed"), "{page}");
 }
 
 #[test]

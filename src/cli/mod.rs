@@ -18,6 +18,7 @@ mod hint;
 mod history;
 mod import;
 mod list;
+mod man;
 mod measure;
 mod near;
 mod new;
@@ -104,6 +105,7 @@ enum Command {
     Import(import::Args),
     Export(export::Args),
     Completions(completions::Args),
+    Man(man::Args),
 }
 
 /// Runs one command.
@@ -142,6 +144,7 @@ pub fn run(cli: &Cli) -> Result<(), Error> {
         Command::Import(args) => import::run(args, db, &console),
         Command::Export(args) => export::run(args, db, &console),
         Command::Completions(args) => completions::run(args, Cli::command()),
+        Command::Man(args) => man::run(args, Cli::command(), &console),
     }
 }
 
