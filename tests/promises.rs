@@ -75,3 +75,4 @@ mod twins;
 mod twins_speckle;
 mod validation;
 mod validity;
+mod view_in_a_browser;

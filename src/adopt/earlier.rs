@@ -102,7 +102,7 @@ fn real_path(path: &Path) -> Option<PathBuf> {
 
 /// Names of all that every diagnosis can write but scenes and materials.
 fn tables() -> impl Iterator<Item = String> {
-    let tables = ["report.html", REPORT, "residuals.csv"].map(str::to_owned);
+    let tables = ["report.html", "view.html", REPORT, "residuals.csv"].map(str::to_owned);
     let pictures =
         PICTURES.iter().flat_map(|name| ["svg", "png"].map(|end| format!("{name}.{end}")));
     tables.into_iter().chain(pictures)

@@ -1,7 +1,7 @@
 //! HTML pages from templates. This is the only file that knows which template engine is used.
 //!
-//! Every value that a template inserts is escaped and loses its control characters. The only exception
-//! is the filter `drawing`, for SVG that this program wrote.
+//! Every value that a template inserts is escaped and loses its control characters. The only exceptions
+//! are the filters `drawing`, for SVG that this program wrote, and `json`, for data that a script reads.
 
 use minijinja::syntax::SyntaxConfig;
 use minijinja::value::{Serde, Value};
@@ -23,7 +23,7 @@ pub struct PageError {
 
 /// A set of templates that may extend and import each other.
 ///
-/// Filters: `drawing` (SVG as it is), `urlword` (text as a value in an address), and the functions of
+/// Filters: `drawing` (SVG as it is), `json` (JSON as an element `script` holds it), `urlword` (text as a value in an address), and the functions of
 /// [`words`] of the same names: `digits`, `fixed(decimals)`, `signed(decimals)`, `plus_minus(sd)`,
 /// `grouped`, `counted(thing)`, `probability`, `in_unit(ucum)`, `listed`.
 pub struct Templates(Environment<'static>);
@@ -47,6 +47,10 @@ impl Templates {
         });
         // Drawings are ours; the text in them is escaped where they are drawn.
         env.add_filter("drawing", |svg: String| Value::from_safe_string(svg));
+        // In JSON this letter is in texts alone, and there it may be spelled out.
+        env.add_filter("json", |json: String| {
+            Value::from_safe_string(json.replace('<', "\\u003c"))
+        });
         env.add_filter("urlword", |text: String| urlword(&text));
         add_words(&mut env);
         for (name, text) in pages {

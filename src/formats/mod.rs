@@ -4,6 +4,7 @@
 //! [`FormatError`] that says where and how to mend it. No reader allocates more than a small
 //! multiple of the bytes it was given, whatever a header claims.
 
+pub mod base64;
 pub mod columns;
 pub mod csv;
 pub mod effect;

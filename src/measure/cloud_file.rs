@@ -17,7 +17,7 @@ use crate::formats::words::significant;
 use crate::formats::{ColumnNames, PointFormat, PointTable};
 use crate::frames::{Global, Point, Pose, Target};
 use crate::material::Scale;
-use crate::render::BESIDE_THE_MEASURED;
+use crate::render::{BESIDE_THE_MEASURED, COLOURS};
 use crate::units::watts_from_dbm;
 
 /// The unit of a power without a unit in its name.
@@ -151,9 +151,8 @@ impl CloudReading {
                 .notices
                 .push(format!("{empty} of {all} points have no place and are passed over"));
         }
-        cloud
-            .notices
-            .extend(table.passed_over(&[&PLACES[..], &VALUES, &BESIDE_THE_MEASURED].concat()));
+        let known = [&PLACES[..], &VALUES, &BESIDE_THE_MEASURED, &COLOURS].concat();
+        cloud.notices.extend(table.passed_over(&known));
         Ok(cloud)
     }
 

@@ -24,6 +24,9 @@ pub const BESIDE_THE_MEASURED: [&str; 16] = [
     "true_range_m",
 ];
 
+/// Columns of the colours of points: what other programs show, and no measurement.
+pub const COLOURS: [&str; 3] = ["red", "green", "blue"];
+
 /// The table of a point cloud: position in the global frame (double), then the measured values and the true cause of
 /// each point. The cause of a false alarm is NaN, or −1 for whole numbers.
 ///

@@ -50,7 +50,7 @@ mod tones;
 
 pub use batch::{Batch, Take, Takes};
 pub use bounce::Bounce;
-pub use cloud::{BESIDE_THE_MEASURED, cloud_table};
+pub use cloud::{BESIDE_THE_MEASURED, COLOURS, cloud_table};
 pub use curvature::{SpotTilt, spot_tilts};
 pub use echo::{Echo, Truth};
 pub use error::RenderError;

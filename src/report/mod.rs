@@ -27,6 +27,7 @@ mod scan;
 mod search;
 mod shell;
 mod templates;
+mod view;
 mod words;
 
 pub use calibration::CalibrationReport;
@@ -57,3 +58,4 @@ pub use scan::{
 };
 pub use search::{MaterialHit, MaterialSearch};
 pub use shell::shell_word;
+pub use view::rendering_page;

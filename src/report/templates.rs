@@ -1,17 +1,19 @@
-//! The pages of a report. Each stands alone: no script, no other file, nothing from outside.
+//! The pages of a report. Each stands alone: no other file, nothing from outside; only the viewer
+//! has a script.
 
 use serde::Serialize;
 
 use crate::error::Error;
 use crate::formats::html::Templates;
 
-const PAGES: [(&str, &str); 6] = [
+const PAGES: [(&str, &str); 7] = [
     ("base.html", include_str!("templates/base.html")),
     ("style.css", include_str!("templates/style.css")),
     ("parts.html", include_str!("templates/parts.html")),
     ("cloud.html", include_str!("templates/cloud.html")),
     ("curve.html", include_str!("templates/curve.html")),
     ("cannot_tell.html", include_str!("templates/cannot_tell.html")),
+    ("viewer.html", include_str!("templates/viewer.html")),
 ];
 
 /// The bytes of a page of this context.

@@ -204,7 +204,10 @@ fn capabilities(profile: &Path, downloads: &Path) -> Value {
     let arguments = [
         "--headless=new",
         "--no-sandbox",
-        "--disable-gpu",
+        // Drawings in three dimensions, in software.
+        "--use-gl=angle",
+        "--use-angle=swiftshader",
+        "--enable-unsafe-swiftshader",
         "--disable-quic",
         "--no-first-run",
         "--disable-background-networking",

@@ -33,6 +33,9 @@ pub(super) struct Args {
     /// Put every hit into cloud.ply, not only those above the threshold
     #[arg(long)]
     all: bool,
+    /// Also write view.html: the cloud in three dimensions, with target, radar and image, for a browser
+    #[arg(long)]
+    view: bool,
     /// Also write the beat signals: beat.npy, chirps x samples; needs [radar.receiver]
     #[arg(long)]
     beat: bool,
@@ -57,6 +60,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         gpu: gpu.as_ref(),
         all_hits: args.all,
         beat,
+        view: args.view,
         packing: if args.uncompressed { Packing::Uncompressed } else { Packing::Zip16 },
         ..RenderRequest::new(&ready)
     };
@@ -65,7 +69,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         request.render(&|progress| stages.show(progress, [chirps, antennas * chirps]))?;
     stages.begin("write", None);
     write_all(&args.output, &rendered.files)?;
-    report::print(&args.output, &rendered.record, stages, console)?;
+    report::print(&args.output, &rendered, stages, console)?;
     let left = rendered.left_behind(&args.output);
     if !left.is_empty() {
         let folder = args.output.display();

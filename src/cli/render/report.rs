@@ -8,21 +8,31 @@ use super::stages::Stages;
 use crate::cli::console::Console;
 use crate::cli::summary::{grouped, table};
 use crate::error::Error;
-use crate::report::{Counts, ReceiverRecord, ScanRecord};
+use crate::report::{Counts, ReceiverRecord, RenderFiles, ScanRecord};
 
 /// Prints the summary of a rendering that was written to `folder`, which ends the last stage.
 pub(super) fn print(
     folder: &Path,
-    record: &ScanRecord,
+    rendered: &RenderFiles,
     stages: Stages,
     console: &Console,
 ) -> Result<(), Error> {
     let (stages_ms, total_s) = stages.end();
+    let (record, files) = (&rendered.record, words(rendered));
     record.notices().iter().for_each(|notice| console.notice(notice));
-    console.result(&text(folder, record, total_s), &value(folder, record, stages_ms))
+    console.result(&text(folder, record, files, total_s), &value(folder, record, stages_ms))
 }
 
-fn text(folder: &Path, record: &ScanRecord, total_s: f64) -> String {
+/// The files of the radar's own view, in words.
+fn words(rendered: &RenderFiles) -> &'static str {
+    if rendered.files.iter().any(|(name, _)| name == "view.html") {
+        "power.exr, power.png, cloud.ply, view.html and scan.json"
+    } else {
+        "power.exr, power.png, cloud.ply and scan.json"
+    }
+}
+
+fn text(folder: &Path, record: &ScanRecord, files: &str, total_s: f64) -> String {
     let materials = record.material_origins();
     let regions = table(
         &["region", "material", "facets", "hits", "detections", "strongest dBm"],
@@ -49,7 +59,7 @@ fn text(folder: &Path, record: &ScanRecord, total_s: f64) -> String {
         _ => ", and the same of each receiver,",
     };
     format!(
-        "{regions}{} chirps, {}\n{receivers}{crossed}wrote power.exr, power.png, cloud.ply and scan.json{more} to {} in \
+        "{regions}{} chirps, {}\n{receivers}{crossed}wrote {files}{more} to {} in \
          {total_s:.2} s\n",
         grouped(record.counts().chirps),
         counted(record.counts()),

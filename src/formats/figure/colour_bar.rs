@@ -71,6 +71,14 @@ impl Colours {
     }
 }
 
+/// The colour of every value, from the least to the greatest of them as on a [`Scale::Sequential`]; NaN is grey.
+pub fn colours_of(values: &[f32]) -> Vec<Rgb> {
+    match Colours::over(values, None, Scale::Sequential) {
+        Ok(Some(colours)) => values.iter().map(|value| colours.of(*value)).collect(),
+        _ => vec![NOTHING; values.len()],
+    }
+}
+
 /// The colour of NaN on a scale.
 pub(super) fn nothing(scale: Scale) -> Rgb {
     match scale {

@@ -13,7 +13,7 @@ mod style;
 pub mod ticks;
 
 pub use bars::{Bar, Bars};
-pub use colour_bar::Scale;
+pub use colour_bar::{Scale, colours_of};
 pub use error::FigureError;
 pub use inline::Inline;
 pub use plot::{Plot, Series, Style};

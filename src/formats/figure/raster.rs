@@ -51,6 +51,18 @@ impl Figure<'_> {
         Ok(self.drawing()?.svg()?)
     }
 
+    /// The pixels alone as the bytes of a PNG file, one of the picture for each of the raster.
+    ///
+    /// # Errors
+    /// As [`Figure::drawing`].
+    pub fn pixels(&self) -> Result<Vec<u8>, FigureError> {
+        let values = self.values()?;
+        let colours = Colours::over(values, self.range, self.scale)?;
+        let cells = self.cells([0, 0], 1, values, colours.as_ref());
+        let [width_px, height_px] = [self.raster.width, self.raster.height].map(|n| n as f32);
+        Ok(Drawing { width_px, height_px, shapes: vec![cells] }.png()?)
+    }
+
     /// The figure as a page.
     ///
     /// # Errors
@@ -64,7 +76,9 @@ impl Figure<'_> {
         let content = (data[0] + 2.5 * GAP_PX + bar.width()).max(TITLE_MIN_WIDTH_PX);
         let axes = Axes::new(self.axes(), data, [self.title, self.subtitle], content);
 
-        let mut shapes = vec![self.cells(&axes, values, colours.as_ref())];
+        let corner = [axes.left as u32, axes.top as u32];
+        let cells = self.cells(corner, self.cell_px() as u32, values, colours.as_ref());
+        let mut shapes = vec![cells];
         shapes.extend(axes.shapes());
         shapes.extend(bar.shapes(axes.left + axes.data_width + 2.5 * GAP_PX, axes.top));
         let bottom = axes.height_with_labels().max(bar.height);
@@ -123,11 +137,18 @@ impl Figure<'_> {
         (self.raster.height * self.cell_px()) as f32
     }
 
-    fn cells(&self, axes: &Axes, values: &[f32], colours: Option<&Colours>) -> Shape {
+    /// The pixels from a corner of the page on, of this size, px.
+    fn cells(
+        &self,
+        [left_px, top_px]: [u32; 2],
+        cell_px: u32,
+        values: &[f32],
+        colours: Option<&Colours>,
+    ) -> Shape {
         Shape::Cells {
-            left_px: axes.left as u32,
-            top_px: axes.top as u32,
-            cell_px: self.cell_px() as u32,
+            left_px,
+            top_px,
+            cell_px,
             columns: self.raster.width,
             colours: values
                 .iter()

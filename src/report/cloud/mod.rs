@@ -4,7 +4,7 @@ mod answer;
 mod bars;
 mod maps;
 mod models;
-mod outline;
+pub(super) mod outline;
 mod page;
 mod pictures;
 mod places;
@@ -22,6 +22,7 @@ use self::raster::Plane;
 use super::json::json_file;
 use super::picture::Picture;
 use super::residuals;
+use super::view::diagnosis_page;
 use super::words::sentence;
 use crate::diagnose::Verdict;
 use crate::error::Error;
@@ -61,12 +62,14 @@ impl<'a> CloudReport<'a> {
         ])
     }
 
-    /// [`CloudReport::tables`], and two files for every picture.
+    /// [`CloudReport::tables`], `view.html`, and two files for every picture.
     ///
     /// # Errors
     /// A picture that is too large to be drawn.
     pub fn tables_and_pictures(&self) -> Result<Vec<(String, Vec<u8>)>, Error> {
         let mut files = self.tables()?;
+        let CloudAnswer { scene, report, .. } = self.answer;
+        files.push(("view.html".to_owned(), diagnosis_page(scene, report)?));
         for picture in &self.pictures {
             files.extend(picture.files()?);
         }

@@ -9,7 +9,7 @@ use crate::geometry::Raster;
 
 /// Where an effect acts, in the target plane.
 #[derive(Clone, Copy)]
-pub(super) enum Outline {
+pub(in crate::report) enum Outline {
     /// Around a patch.
     Ring { x_m: f64, y_m: f64, radius_m: f64 },
     /// The border of a layer, `off_m` from the middle of the field of view in a direction from x towards y.
@@ -22,9 +22,7 @@ impl Outline {
         match found.place? {
             Place::Beyond { off_m, direction_deg } => Some(Outline::Line { off_m, direction_deg }),
             Place::Round { x_m, y_m, radius_m } => {
-                let nearest = rows
-                    .iter()
-                    .min_by(|a, b| distance_m(a, x_m, y_m).total_cmp(&distance_m(b, x_m, y_m)))?;
+                let nearest = nearest(rows, x_m, y_m)?;
                 // The radius is one on the surface.
                 let radius_m = radius_m * plane_m / nearest.range_m;
                 Some(Outline::Ring { x_m, y_m, radius_m })
@@ -42,8 +40,16 @@ impl Outline {
         }
     }
 
+    /// What it is of its effect.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Outline::Ring { .. } => "outline",
+            Outline::Line { .. } => "border",
+        }
+    }
+
     /// Its points in the target plane, m.
-    fn points_m(&self) -> Vec<[f64; 2]> {
+    pub fn points_m(&self) -> Vec<[f64; 2]> {
         const CORNERS: u32 = 72;
         /// As far as a field of view reaches, and how finely a line is followed.
         const HALF_M: f64 = 4.0;
@@ -99,8 +105,13 @@ impl Outline {
     }
 }
 
+/// The shot that is nearest to a place in the target plane.
+pub(in crate::report) fn nearest(rows: &[Row], x_m: f64, y_m: f64) -> Option<&Row> {
+    rows.iter().min_by(|a, b| distance_m(a, x_m, y_m).total_cmp(&distance_m(b, x_m, y_m)))
+}
+
 /// Distance of a shot from a place in the target plane, m.
-fn distance_m(row: &Row, x_m: f64, y_m: f64) -> f64 {
+pub(in crate::report) fn distance_m(row: &Row, x_m: f64, y_m: f64) -> f64 {
     (row.xt_m - x_m).hypot(row.yt_m - y_m)
 }
 

@@ -3,46 +3,90 @@
 use super::record::ScanRecord;
 use crate::error::Error;
 use crate::formats::exr::{self, Attribute, Packing};
-use crate::formats::figure::{Figure, Scale};
-use crate::formats::ply;
+use crate::formats::figure::{Figure, Scale, colours_of};
+use crate::formats::ply::{self, Column, Scalar, Table};
 use crate::formats::words::grouped;
 use crate::geometry::Raster;
 use crate::radar::{Channel, Returns};
-use crate::render::{Echo, Scan, cloud_table};
+use crate::render::{COLOURS, Echo, Scan, cloud_table};
+use crate::report::view::rendering_page;
 use crate::scene::Scene;
 use crate::setup::{ReadyScene, View};
 use crate::units::dbm_from_watts;
 
-/// Encodes image and cloud of every view; `all` puts hits below the threshold into the clouds, too.
-pub(super) fn encode(
-    all: bool,
-    packing: Packing,
-    ready: &ReadyScene,
-    views: &[View],
-    images: &[Raster],
-    record: &ScanRecord,
-) -> Result<Vec<(String, Vec<u8>)>, Error> {
-    let scene = &ready.scene;
-    let regions: Vec<&str> = scene.target.regions.iter().map(|r| r.name.as_str()).collect();
-    let materials = record.material_names();
-    let materials: Vec<&str> = materials.iter().map(String::as_str).collect();
-    let several = scene.target.transmits() || scene.radar().returns != Returns::Strongest;
-    let exr = |image| exr::write_packed(image, &exr_attributes(image, &materials), packing);
-    let cloud = |view: &View| {
-        let echoes: Vec<&Echo> =
-            if all { view.scan.echoes.iter().collect() } else { view.scan.detections().collect() };
-        let table = cloud_table(&echoes, &ready.material_of_region, &regions, &materials, several);
-        ply::write_table(&table)
-    };
-    let mut files = Vec::new();
-    for (view, image) in std::iter::zip(views, images) {
-        let (figure, (exr, cloud)) =
-            rayon::join(|| power_figure(scene, view, image), || (exr(image), cloud(view)));
-        files.push((view.file_name("power", "exr"), exr?));
-        files.push((view.file_name("power", "png"), figure?));
-        files.push((view.file_name("cloud", "ply"), cloud?));
+/// What the files of a view hold.
+#[derive(Clone, Copy)]
+pub(super) struct Content {
+    /// Whether the clouds hold hits below the threshold, too.
+    pub all_hits: bool,
+    /// How the EXR images are packed.
+    pub packing: Packing,
+    /// Whether there is a page that shows the cloud in three dimensions.
+    pub view: bool,
+}
+
+impl Content {
+    /// Encodes image and cloud of every view.
+    pub fn encode(
+        self,
+        ready: &ReadyScene,
+        views: &[View],
+        images: &[Raster],
+        record: &ScanRecord,
+    ) -> Result<Vec<(String, Vec<u8>)>, Error> {
+        let scene = &ready.scene;
+        let materials = record.material_names();
+        let materials: Vec<&str> = materials.iter().map(String::as_str).collect();
+        let mut files = Vec::new();
+        for (view, image) in std::iter::zip(views, images) {
+            let (figure, (exr, (table, cloud))) = rayon::join(
+                || power_figure(scene, view, image),
+                || {
+                    let attributes = exr_attributes(image, &materials);
+                    let table = self.cloud(ready, view, &materials);
+                    let cloud = ply::write_table(&table);
+                    (exr::write_packed(image, &attributes, self.packing), (table, cloud))
+                },
+            );
+            files.push((view.file_name("power", "exr"), exr?));
+            files.push((view.file_name("power", "png"), figure?));
+            files.push((view.file_name("cloud", "ply"), cloud?));
+            if self.view {
+                let page = rendering_page(scene, &table, image, &materials)?;
+                files.push((view.file_name("view", "html"), page));
+            }
+        }
+        Ok(files)
     }
-    Ok(files)
+
+    /// The cloud of a view, with a colour for each point.
+    fn cloud(self, ready: &ReadyScene, view: &View, materials: &[&str]) -> Table {
+        let target = &ready.scene.target;
+        let regions: Vec<&str> = target.regions.iter().map(|region| region.name.as_str()).collect();
+        let several = target.transmits() || ready.scene.radar().returns != Returns::Strongest;
+        let echoes: Vec<&Echo> = if self.all_hits {
+            view.scan.echoes.iter().collect()
+        } else {
+            view.scan.detections().collect()
+        };
+        let mut table =
+            cloud_table(&echoes, &ready.material_of_region, &regions, materials, several);
+        table.columns.extend(colours(&table));
+        table
+    }
+}
+
+/// Red, green and blue of the points of a cloud, by their power.
+fn colours(cloud: &Table) -> Vec<Column> {
+    let powers_dbm = cloud.column("power_dbm").unwrap_or_default();
+    let powers_dbm: Vec<f32> = powers_dbm.iter().map(|power_dbm| *power_dbm as f32).collect();
+    let colours = colours_of(&powers_dbm);
+    let columns = COLOURS.into_iter().enumerate().map(|(place, name)| Column {
+        name: name.to_owned(),
+        scalar: Scalar::UChar,
+        values: colours.iter().map(|colour| colour[place].into()).collect(),
+    });
+    columns.collect()
 }
 
 /// Whether a file of this name is one of a rendering, for an antenna or another.
@@ -50,7 +94,10 @@ pub(super) fn is_of_a_rendering(name: &str) -> bool {
     let (stem, extension) = name.rsplit_once('.').unwrap_or((name, ""));
     let stem = stem.strip_prefix("cross-").unwrap_or(stem);
     let quantity = stem.split_once('-').map_or(stem, |(quantity, _)| quantity);
-    matches!((quantity, extension), ("power", "exr" | "png") | ("cloud", "ply") | ("beat", "npy"))
+    matches!(
+        (quantity, extension),
+        ("power", "exr" | "png") | ("cloud", "ply") | ("beat", "npy") | ("view", "html")
+    )
 }
 
 /// What a raster does not say by itself: its far edges, and names for the `material` channel.

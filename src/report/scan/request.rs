@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::beat::BeatShape;
-use super::files::{encode, is_of_a_rendering};
+use super::files::{Content, is_of_a_rendering};
 use super::record::ScanRecord;
 use crate::error::Error;
 use crate::formats::exr::Packing;
@@ -28,6 +28,8 @@ pub struct RenderRequest<'a> {
     pub beat: Option<BeatShape>,
     /// How the EXR images are packed.
     pub packing: Packing,
+    /// Whether there is a page for each antenna that shows its cloud in three dimensions.
+    pub view: bool,
 }
 
 /// A stage of a rendering.
@@ -61,7 +63,7 @@ pub struct RenderFiles<'a> {
     /// What `scan.json` holds.
     pub record: ScanRecord<'a>,
     /// Names and bytes: `power.exr`, `power.png` and `cloud.ply` of every antenna, `scan.json`, and the beat signals
-    /// that were asked for.
+    /// and the pages `view.html` that were asked for.
     pub files: Vec<(String, Vec<u8>)>,
 }
 
@@ -84,7 +86,15 @@ impl<'a> RenderRequest<'a> {
     /// The usual files of a scene: detections, without beat signals.
     pub fn new(ready: &'a ReadyScene) -> RenderRequest<'a> {
         let (tracer, packing) = (Tracer::Automatic, Packing::Zip16);
-        RenderRequest { ready, tracer, gpu: None, all_hits: false, beat: None, packing }
+        RenderRequest {
+            ready,
+            tracer,
+            gpu: None,
+            all_hits: false,
+            beat: None,
+            packing,
+            view: false,
+        }
     }
 
     /// Renders the scene and encodes its files; `progress` hears of every stage and of the chirps that are done.
@@ -117,10 +127,11 @@ impl<'a> RenderRequest<'a> {
         let mut record =
             ScanRecord::new(ready, assembly.model(), &views, &crossed, &images, validity, all_hits);
         record.rays_ended = footprints.ended;
-        let mut files = encode(all_hits, self.packing, ready, &views, &images, &record)?;
+        let content = Content { all_hits, packing: self.packing, view: self.view };
+        let mut files = content.encode(ready, &views, &images, &record)?;
         let crossed_images: Vec<Raster> =
             crossed.iter().map(|view| ready.image(&view.scan)).collect();
-        files.extend(encode(all_hits, self.packing, ready, &crossed, &crossed_images, &record)?);
+        files.extend(content.encode(ready, &crossed, &crossed_images, &record)?);
         files.push(("scan.json".to_owned(), json_file(&record)?));
         if let Some(shape) = self.beat {
             for view in &views {

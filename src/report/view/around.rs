@@ -1,0 +1,75 @@
+//! What stands around a cloud: the radar with its scan, and the power image.
+
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+
+use super::page::{Instrument, Numbers, Plane, PowerImage};
+use crate::error::Error;
+use crate::formats::base64::base64;
+use crate::formats::figure::{Figure, Scale};
+use crate::frames::{Global, Point, Pose, Target};
+use crate::geometry::Raster;
+use crate::scene::Scene;
+
+/// Corners of the outline of a spot.
+const CORNERS: u32 = 48;
+
+/// The radar of a scene, and where it looks.
+pub(super) fn instrument(scene: &Scene) -> Instrument {
+    let (radar, frames) = (scene.radar(), scene.radar().frames());
+    let target = &frames.global_from_target;
+    let aims = scene.chirps.target_points_m(&frames);
+    let radius_m = 0.5 * radar.spot_fwhm_m();
+    let outline = (0..=CORNERS).map(|corner| {
+        let (sin, cos) = (f64::from(corner) / f64::from(CORNERS) * TAU).sin_cos();
+        in_plane(target, radius_m * cos, radius_m * sin)
+    });
+    Instrument {
+        origin_m: frames.origin().xyz.to_array(),
+        target_m: in_plane(target, 0.0, 0.0).to_array(),
+        path_m: Numbers::places(aims.map(|aim| in_plane(target, aim.x, aim.y))),
+        spot_m: Numbers::places(outline),
+    }
+}
+
+/// A power image in the target plane of a scene.
+///
+/// # Errors
+/// A raster without power.
+pub(super) fn power_image(scene: &Scene, image: &Raster) -> Result<PowerImage, Error> {
+    let figure = Figure {
+        raster: image,
+        channel: "power_dbm",
+        title: "",
+        subtitle: "",
+        colour_label: "",
+        range: None,
+        scale: Scale::Sequential,
+        gaps: "",
+        x_label: "",
+        y_label: "",
+    };
+    let global_from_target = scene.radar().frames().global_from_target;
+    let [origin, x, y] =
+        [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].map(|(x, y)| in_plane(&global_from_target, x, y));
+    Ok(PowerImage {
+        png: base64(&figure.pixels()?),
+        rows: image.height,
+        columns: image.width,
+        from_m: [image.x_m(0), image.y_m(0)],
+        step_m: [image.pixel_m, -image.pixel_m],
+        frame: Plane {
+            origin_m: origin.to_array(),
+            x: (x - origin).to_array(),
+            y: (y - origin).to_array(),
+        },
+        x_column: "xt_m",
+        y_column: "yt_m",
+    })
+}
+
+/// A place in the target plane.
+pub(super) fn in_plane(global_from_target: &Pose<Global, Target>, x_m: f64, y_m: f64) -> DVec3 {
+    (*global_from_target * Point::<Target>::new(x_m, y_m, 0.0)).xyz
+}

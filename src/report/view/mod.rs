@@ -1,0 +1,10 @@
+//! `view.html`: a cloud in three dimensions, with its target, its radar and its image, in one page that asks for no other
+//! file.
+
+mod around;
+mod diagnosis;
+mod page;
+mod rendering;
+
+pub(super) use diagnosis::diagnosis_page;
+pub use rendering::rendering_page;

@@ -1,0 +1,108 @@
+//! Promise: `view.html` shows the cloud of a rendering or of a diagnosis in a real browser, from a folder: its points, their
+//! columns, thresholds and picked points; it says nothing on the console and asks for nothing else.
+
+use std::path::Path;
+
+use serde_json::{Value, json};
+
+use crate::support::browser::Browser;
+use crate::support::{matdb, read_cloud, scene};
+
+const SHOWN: &str = "return window.matdbView.shown()";
+
+/// Opens the page and waits until it is drawn.
+fn open(browser: &Browser, path: &Path) {
+    browser.open(&format!("file://{}", path.display()));
+    browser.script("window.matdbView.ready.then(() => { window.isReady = true })");
+    browser.wait("return window.isReady === true");
+}
+
+/// Nothing was said, and nothing was asked for but the page.
+fn was_quiet(browser: &Browser) {
+    assert_eq!(browser.console(), Vec::<String>::new());
+    for address in browser.requests() {
+        let own = ["file:", "data:", "about:", "chrome:", "chrome-untrusted:", "blob:"];
+        assert!(own.iter().any(|start| address.starts_with(start)), "{address} was asked for");
+    }
+}
+
+#[test]
+fn a_rendering_is_shown_in_three_dimensions() {
+    let folder = tempfile::tempdir().unwrap();
+    let Some(browser) = Browser::start(folder.path()) else { return };
+    let out = folder.path().join("out");
+    let mut render = matdb(folder.path());
+    render.arg("render").arg(scene("concealed.toml")).arg("--view").arg("-o").arg(&out);
+    render.assert().success();
+    let cloud = read_cloud(&out.join("cloud.ply"));
+    let powers = &cloud["power_dbm"];
+    let page = std::fs::read_to_string(out.join("view.html")).unwrap();
+    assert!(!page.contains("http://") && !page.contains("https://"));
+
+    open(&browser, &out.join("view.html"));
+    let number = |script: &str| browser.script(script);
+    assert_eq!(number(SHOWN), json!(powers.len()));
+    // A threshold shows the points above it, and the address keeps it.
+    let middle = {
+        let mut sorted = powers.clone();
+        sorted.sort_by(f64::total_cmp);
+        sorted[sorted.len() / 2] + 1e-3
+    };
+    browser.script("window.matdbView.setColumn('power_dbm')");
+    browser.script(&format!("window.matdbView.setThreshold({middle}, Infinity)"));
+    let above = powers.iter().filter(|power| **power > middle).count();
+    assert_eq!(number(SHOWN), json!(above));
+    browser.wait("return location.hash.length > 1");
+    browser.reload();
+    browser.script("window.matdbView.ready.then(() => { window.isReady = true })");
+    browser.wait("return window.isReady === true");
+    assert_eq!(number(SHOWN), json!(above));
+    // A picked point says what the file has of it, and is drawn where it should be.
+    let brightest = (0..powers.len()).max_by(|a, b| powers[*a].total_cmp(&powers[*b])).unwrap();
+    browser.script(&format!("window.matdbView.pick({brightest})"));
+    let said = browser.text("return document.body.innerText");
+    assert!(said.contains("mannequin-paint") && said.contains("skin"), "{said}");
+    assert!(said.contains(&format!("{:.1}", powers[brightest]).replace('-', "")), "{said}");
+    let [x, y] = [0, 1].map(|at| {
+        browser
+            .script(&format!("return window.matdbView.pixelOf({brightest})[{at}]"))
+            .as_f64()
+            .unwrap()
+    });
+    let [wide, high] = ["Width", "Height"].map(|side| {
+        let script = format!("return document.querySelector('canvas').client{side}");
+        browser.script(&script).as_f64().unwrap()
+    });
+    assert!((0.0..wide).contains(&x) && (0.0..high).contains(&y), "{x} {y} of {wide} {high}");
+    was_quiet(&browser);
+}
+
+#[test]
+fn a_diagnosis_shows_residuals_and_where_its_effects_act() {
+    let folder = tempfile::tempdir().unwrap();
+    let Some(browser) = Browser::start(folder.path()) else { return };
+    let (out, why) = (folder.path().join("out"), folder.path().join("why"));
+    matdb(folder.path())
+        .arg("render")
+        .arg(scene("concealed.toml"))
+        .arg("-o")
+        .arg(&out)
+        .assert()
+        .success();
+    let mut diagnose = matdb(folder.path());
+    diagnose.arg("diagnose").arg(out.join("cloud.ply")).args(["--no-controls", "--scene"]);
+    diagnose.arg(scene("bench.toml")).arg("-o").arg(&why).assert().success();
+    let page = std::fs::read_to_string(why.join("report.html")).unwrap();
+    assert!(page.contains("href=\"view.html\""));
+
+    open(&browser, &why.join("view.html"));
+    let detected = std::fs::read_to_string(why.join("residuals.csv")).unwrap();
+    let detected =
+        detected.lines().skip(1).filter(|line| line.split(',').nth(1) != Some("")).count();
+    assert_eq!(browser.script(SHOWN), json!(detected));
+    let said = browser.text("return document.body.innerText");
+    assert!(said.contains("foreign-patch: outline"), "{said}");
+    let state: Value = browser.script("return window.matdbView.state()");
+    assert!(state.to_string().contains("residual_after_db"), "{state}");
+    was_quiet(&browser);
+}
