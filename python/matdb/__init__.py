@@ -9,13 +9,17 @@ True
 import sys
 
 from ._matdb import (
+    Cloud,
+    Comparison,
     Database,
+    Diagnosis,
     Error,
     FileError,
     Fit,
     Material,
     MaterialError,
     Measurement,
+    Page,
     RenderError,
     Scan,
     Scene,
@@ -24,6 +28,8 @@ from ._matdb import (
     UsageError,
     View,
     __version__,
+    calibrate,
+    compare,
     diagnose,
     fit,
     load_scene,
@@ -34,13 +40,17 @@ from ._matdb import (
 from ._matdb import _run
 
 __all__ = [
+    "Cloud",
+    "Comparison",
     "Database",
+    "Diagnosis",
     "Error",
     "FileError",
     "Fit",
     "Material",
     "MaterialError",
     "Measurement",
+    "Page",
     "RenderError",
     "Scan",
     "Scene",
@@ -49,6 +59,8 @@ __all__ = [
     "UsageError",
     "View",
     "__version__",
+    "calibrate",
+    "compare",
     "diagnose",
     "fit",
     "load_scene",

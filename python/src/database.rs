@@ -3,23 +3,27 @@
 use std::path::PathBuf;
 
 use matdb::adopt::{
-    CatalogueImport, CheckReport, DatabaseCheck, NewMaterials, Withdrawal, remove_materials,
+    CatalogueImport, CheckReport, CurveOrigin, DatabaseCheck, FitStorage, FittedMaterial,
+    NewMaterials, StoredFit, Withdrawal, remove_materials,
 };
 use matdb::catalogue::exchange::{Details, Export, Format};
 use matdb::catalogue::{About, Citable, Credit, Diff, Rank, publish, references};
 use matdb::error::Error;
 use matdb::files::{folder_of, read_small, write_all};
-use matdb::material::{Slug, builtin};
+use matdb::material::{Slug, SourceKind, builtin};
 use matdb::report::{
-    ExportReport, ExportRequest, MaterialSearch, NeighbourSearch, revision_records,
+    ExportReport, ExportRequest, MaterialSearch, NeighbourSearch, Prediction, revision_records,
 };
-use matdb::setup::{self, find_material};
+use matdb::setup::{self, MaterialRevision, find_material};
 use matdb::store::{Filter, Store};
+use matdb::units::watts_from_dbm;
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 use serde_json::json;
 
 use crate::error::{MaterialError, UsageError, raised};
+use crate::fit::Fit;
 use crate::json::to_python;
 use crate::material::Material;
 
@@ -39,6 +43,43 @@ impl Database {
 
     pub(crate) fn database(&self) -> setup::Database {
         setup::Database::new(Some(&self.path))
+    }
+
+    /// Stores a fit under the name of a material.
+    fn add_fit(
+        &self,
+        py: Python<'_>,
+        name: &str,
+        fit: &Fit,
+        origin: CurveOrigin,
+        material_class: &str,
+        description: Option<String>,
+    ) -> PyResult<Vec<String>> {
+        let slug: Slug = name.parse().map_err(|error| UsageError::new_err(format!("{error}")))?;
+        let stored = py.detach(|| {
+            let CurveOrigin { kind, title, licence, instrument, frequency_hz, threshold_w } =
+                origin.clone();
+            let details = Details {
+                slug: Some(slug),
+                class: Some(material_class.to_owned()),
+                description,
+                kind,
+                source: title,
+                licence,
+                instrument,
+                frequency_hz,
+                threshold_w,
+                ..Details::default()
+            };
+            // A curve of a material has its origin there.
+            let origin = if fit.subject.found.is_some() { CurveOrigin::default() } else { origin };
+            let material = fit.subject.found.is_none().then(|| name.to_owned());
+            let storage = FitStorage { material, keep_render: false, origin };
+            let Fit { subject, result, fit_name, .. } = fit;
+            FittedMaterial { subject, result, fit_name, details, storage }.store(&self.database())
+        });
+        let StoredFit { material, revision, .. } = stored.map_err(raised)?;
+        Ok(vec![format!("{material}@{revision}")])
     }
 }
 
@@ -109,26 +150,66 @@ impl Database {
         }
     }
 
-    /// Adds built-in materials by name, and those of files or folders: `material.toml`, or a format of others.
+    /// Adds built-in materials by name, and those of files or folders: `material.toml`, or a format of others. Or a fit
+    /// under the name of a material, which is made where it is not there: `db.add("my-skin", fit, source="My bench, 2026",
+    /// licence="CC-BY-4.0")`.
     ///
     /// Parameters
     /// ----------
     /// *names : str
-    ///     Built-in materials.
+    ///     Built-in materials; or the name of one material and its `Fit`.
     /// files : list of path, optional
     ///     Files, or folders with a `material.toml` each.
+    /// source, licence : str, optional
+    ///     Of the curve of a fit: who measured it, when and how, and the SPDX expression of its licence.
+    /// kind : str, default "measured"
+    ///     How the curve came to be: `measured`, `literature`, `modelled` or `synthetic`.
+    /// material_class, description : str, optional
+    ///     Of a new material.
+    /// instrument : str, optional
+    /// frequency_ghz, threshold_dbm : float, optional
+    ///     What the curve was measured with; that of the scene that it was measured in unless stated.
     ///
     /// Returns
     /// -------
     /// list of str
     ///     `NAME@REVISION` of each.
-    #[pyo3(signature = (*names, files = Vec::new()))]
+    #[pyo3(signature = (*names, files = Vec::new(), source = None, licence = None, kind = "measured",
+                        material_class = "sample", description = None, instrument = None, frequency_ghz = None,
+                        threshold_dbm = None))]
+    #[expect(clippy::too_many_arguments, reason = "each is a keyword in Python")]
     fn add(
         &self,
         py: Python<'_>,
-        names: Vec<String>,
+        names: &Bound<'_, PyTuple>,
         files: Vec<PathBuf>,
+        source: Option<String>,
+        licence: Option<String>,
+        kind: &str,
+        material_class: &str,
+        description: Option<String>,
+        instrument: Option<String>,
+        frequency_ghz: Option<f64>,
+        threshold_dbm: Option<f64>,
     ) -> PyResult<Vec<String>> {
+        if let Ok((name, fit)) = names.extract::<(String, Bound<'_, Fit>)>() {
+            let fit = fit.get();
+            let own = fit.instrument.as_ref();
+            let wrong = |error| UsageError::new_err(format!("kind: {error}"));
+            let kind: SourceKind = serde_json::from_value(json!(kind)).map_err(wrong)?;
+            let origin = CurveOrigin {
+                kind: Some(kind),
+                title: source,
+                licence,
+                instrument: instrument.or_else(|| own.map(|one| one.name.clone())),
+                frequency_hz: frequency_ghz
+                    .map(|ghz| ghz * 1e9)
+                    .or(own.map(|one| one.frequency_hz)),
+                threshold_w: threshold_dbm.map(watts_from_dbm).or(own.map(|one| one.threshold_w)),
+            };
+            return self.add_fit(py, &name, fit, origin, material_class, description);
+        }
+        let names: Vec<String> = names.extract()?;
         py.detach(|| {
             let database = self.database();
             let given = Details::default();
@@ -153,6 +234,30 @@ impl Database {
     fn history<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
         let records = py.detach(|| revision_records(name, &self.database()));
         to_python(py, &records.map_err(raised)?)
+    }
+
+    /// What the rendered law of a material says at angles of incidence, with a 95 % band, as `matdb predict --json` prints it.
+    ///
+    /// Parameters
+    /// ----------
+    /// name : str
+    ///     `NAME` or `NAME@REVISION`.
+    /// angles_deg : sequence of float
+    ///     From 0 to below 90.
+    fn predict<'py>(
+        &self,
+        py: Python<'py>,
+        name: &str,
+        angles_deg: Vec<f64>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        if let Some(wrong) = angles_deg.iter().find(|angle| !(0.0..90.0).contains(*angle)) {
+            return Err(UsageError::new_err(format!("{wrong}° is not from 0 to below 90")));
+        }
+        let store = self.store()?;
+        let found = find_material(store.as_ref(), name, "").map_err(raised)?;
+        let MaterialRevision { material, revision } = &found;
+        let prediction = py.detach(|| Prediction::new(material, *revision, &angles_deg));
+        to_python(py, &prediction.map_err(raised)?)
     }
 
     /// What differs between two materials or revisions, as `matdb diff --json` prints it.

@@ -1,29 +1,49 @@
 //! What a model lacks.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use matdb::adopt::{CloudRequest, Earlier, Publication};
+use matdb::adopt::{CheckedRequest, CloudRequest, Earlier, Publication, input};
+use matdb::diagnose::Report;
 use matdb::error::Error;
-use matdb::files::write_all;
-use matdb::measure::CloudReading;
-use matdb::setup::read_cloud;
+use matdb::files::{folder_of, write_all};
+use matdb::scene::read_text;
+use matdb::setup;
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use serde_json::{Value, json};
 
+use crate::cloud::CloudLike;
 use crate::database::Database;
 use crate::error::raised;
+use crate::interrupt::interruptible;
 use crate::json::to_python;
+use crate::scene::{Scene, SceneLike};
 
-/// Finds the physical effects that a scene lacks to explain a measured cloud, and writes a report of them.
+/// What was diagnosed: a cloud and the scene that was measured.
+struct Subject {
+    cloud: CloudLike,
+    scene: Py<Scene>,
+    database: Option<setup::Database>,
+    seed: u64,
+    controls: bool,
+}
+
+/// What a scene lacks to explain a cloud.
+#[pyclass(frozen, module = "matdb")]
+pub(crate) struct Diagnosis {
+    subject: Subject,
+    found: Report,
+    record: Value,
+}
+
+/// Finds the physical effects that a scene lacks to explain a measured cloud, on all cores. Ctrl-C ends it.
 ///
 /// Parameters
 /// ----------
-/// cloud : str or os.PathLike
+/// cloud : Cloud, str or os.PathLike
 ///     The measured cloud, with a row of each detection.
-/// scene : str or os.PathLike
-///     The file of the scene that was measured.
-/// folder : str or os.PathLike
-///     Where `report.html`, `report.json` and the scene with what was found are written.
+/// scene : Scene, str or os.PathLike
+///     The scene that was measured.
 /// db : Database, optional
 ///     Where materials are looked for; without it, and for those that it does not have, the built-in ones.
 /// seed : int, default 0
@@ -32,50 +52,156 @@ use crate::json::to_python;
 ///
 /// Returns
 /// -------
-/// dict
-///     What `matdb diagnose --json` prints: `verdict`, `effects` with their numbers, errors before and after.
+/// Diagnosis
 ///
 /// Raises
 /// ------
 /// matdb.Error
 ///     Too few data, or data that are not of this scene.
 #[pyfunction]
-#[pyo3(signature = (cloud, scene, folder, *, db = None, seed = 0, controls = true))]
-pub(crate) fn diagnose<'py>(
-    py: Python<'py>,
-    cloud: PathBuf,
-    scene: PathBuf,
-    folder: PathBuf,
+#[pyo3(signature = (cloud, scene, *, db = None, seed = 0, controls = true))]
+pub(crate) fn diagnose(
+    py: Python<'_>,
+    cloud: CloudLike,
+    scene: SceneLike,
     db: Option<&Database>,
     seed: u64,
     controls: bool,
-) -> PyResult<Bound<'py, PyAny>> {
-    let database = db.map(Database::database);
-    let record = py.detach(|| -> Result<Value, Error> {
+) -> PyResult<Diagnosis> {
+    let (scene, database) = (scene.scene(py)?, db.map(Database::database));
+    let subject = Subject { cloud, scene, database, seed, controls };
+    let answer = interruptible(py, |stop| {
+        subject.check(Path::new("."), |checked| {
+            let clouds = checked.read_clouds(|_, _| subject.cloud.read())?;
+            let report = checked.diagnose(&clouds, &|_| stop.check())?;
+            let record = publication(checked, &report, &checked.notices(), |publication| {
+                Ok(json!(publication.report().record()))
+            })?;
+            Ok((report, record))
+        })
+    })?;
+    let (found, record) = answer.map_err(raised::<Error>)?;
+    Ok(Diagnosis { subject, found, record })
+}
+
+impl Subject {
+    /// Checks the request, with its report in a folder, and hands it on.
+    fn check<Done>(
+        &self,
+        folder: &Path,
+        done: impl FnOnce(&CheckedRequest) -> Result<Done, Error>,
+    ) -> Result<Done, Error> {
+        let scene = self.scene.get();
         let request = CloudRequest {
-            cloud: &cloud,
-            scene: &scene,
+            cloud: self.cloud.path(),
+            scene: scene.path(),
             further: &[],
             receiver: None,
             effects: &[],
             material: None,
-            seed,
-            controls,
-            folder: &folder,
+            seed: self.seed,
+            controls: self.controls,
+            folder,
             add: false,
         };
-        let store = database.map(|database| database.read()).transpose()?.flatten();
-        let checked = request.check(store.as_ref())?;
-        let notices = checked.notices();
-        let clouds = checked.read_clouds(|path, _| read_cloud(path, &CloudReading::default()))?;
-        let report = checked.diagnose(&clouds, &|_| ())?;
-        let words = ["matdb".to_owned(), "matdb diagnose".to_owned()];
-        let publication = Publication::new(&checked, &report, &notices, words);
-        let earlier = Earlier::in_folder(&folder, &checked.request.inputs());
-        let files = publication.files()?;
-        write_all(&folder, &files)?;
-        earlier.remove_all_but(&files);
-        Ok(json!(publication.report().record()))
-    });
-    to_python(py, &record.map_err(raised)?)
+        let store = self.database.as_ref().map(|database| database.read()).transpose()?.flatten();
+        let text = scene.own_text().to_owned();
+        let is_file = read_text(scene.path()).is_ok_and(|file| file == text);
+        let mut checked =
+            request.check_scene(scene.scene().clone(), text.clone(), store.as_ref())?;
+        if !(self.cloud.is_file() && is_file) {
+            checked.given = vec![self.cloud.input()?, input(scene.path(), text.as_bytes())];
+        }
+        done(&checked)
+    }
+}
+
+/// Hands on the files and words of a diagnosis.
+fn publication<Done>(
+    checked: &CheckedRequest,
+    report: &Report,
+    notices: &[String],
+    done: impl FnOnce(&Publication) -> Result<Done, Error>,
+) -> Result<Done, Error> {
+    let words = ["matdb".to_owned(), "matdb diagnose".to_owned()];
+    done(&Publication::new(checked, report, notices, words))
+}
+
+impl Diagnosis {
+    /// The files of its report, for a folder, and what an earlier one left there.
+    fn files(&self, folder: &Path) -> Result<(Vec<(String, Vec<u8>)>, Earlier), Error> {
+        self.subject.check(folder, |checked| {
+            publication(checked, &self.found, &checked.notices(), |publication| {
+                let earlier = Earlier::in_folder(folder, &checked.request.inputs());
+                Ok((publication.files()?, earlier))
+            })
+        })
+    }
+
+    fn value<'py>(&self, py: Python<'py>, path: &str) -> PyResult<Bound<'py, PyAny>> {
+        to_python(py, self.record.pointer(path).unwrap_or(&Value::Null))
+    }
+}
+
+#[pymethods]
+impl Diagnosis {
+    /// What was found, in a word: `explained`, `no-missing-effect`, `unexplained` and others.
+    #[getter]
+    fn verdict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.value(py, "/verdict")
+    }
+
+    /// The effects that the scene lacks, each with its numbers and its evidence.
+    #[getter]
+    fn effects<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.value(py, "/effects")
+    }
+
+    /// Errors on parts of the scan that took no part in a fit, without the effects.
+    #[getter]
+    fn before<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.value(py, "/error/before")
+    }
+
+    /// The same with the effects.
+    #[getter]
+    fn after<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.value(py, "/error/after")
+    }
+
+    /// All of it, as `report.json` has it.
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        to_python(py, &self.record)
+    }
+
+    /// Writes the report as one page, `report.html` for a person.
+    fn report(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let written = py.detach(|| {
+            let (files, _) = self.files(folder_of(&path))?;
+            let page = files.into_iter().find(|(name, _)| name == "report.html");
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let pages: Vec<_> = page.into_iter().map(|(_, bytes)| (name.clone(), bytes)).collect();
+            Ok(write_all(folder_of(&path), &pages)?)
+        });
+        written.map_err(raised::<Error>)
+    }
+
+    /// Writes the files that `matdb diagnose` writes, all or none, in the place of those of an earlier diagnosis.
+    fn save(&self, py: Python<'_>, folder: PathBuf) -> PyResult<()> {
+        let written = py.detach(|| {
+            let (files, earlier) = self.files(&folder)?;
+            write_all(&folder, &files)?;
+            earlier.remove_all_but(&files);
+            Ok(())
+        });
+        written.map_err(raised::<Error>)
+    }
+
+    fn __repr__(&self) -> PyResult<String> {
+        let verdict = self.record["verdict"].as_str();
+        let verdict = verdict.ok_or_else(|| PyRuntimeError::new_err("no verdict"))?;
+        let effects = self.record["effects"].as_array().into_iter().flatten();
+        let names: Vec<&str> = effects.filter_map(|one| one["name"].as_str()).collect();
+        Ok(format!("<matdb.Diagnosis: {verdict} {}>", names.join(", ")).replace(" >", ">"))
+    }
 }

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
-use matdb::adopt::{FitMethod, FitOutcome, FitRequest};
+use matdb::adopt::{FitMethod, FitOutcome, FitRequest, FitSubject};
 use matdb::error::Error;
 use matdb::fit::FitResult;
 use matdb::setup;
 use matdb::units::watts_from_dbm;
-use numpy::{PyArray1, PyArrayLike1};
+use numpy::{PyArray1, PyArray2, PyArrayLike1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -17,13 +17,103 @@ use crate::database::Database;
 use crate::error::raised;
 use crate::json::to_python;
 use crate::material::sigma0_db;
+use crate::measure::Instrument;
 
 /// A model that was fitted to a curve.
 #[pyclass(frozen, module = "matdb")]
 pub(crate) struct Fit {
-    result: FitResult,
-    label: String,
+    pub(crate) result: FitResult,
+    pub(crate) subject: FitSubject,
+    pub(crate) fit_name: String,
+    /// The radar of a curve that was measured here.
+    pub(crate) instrument: Option<Instrument>,
     notices: Vec<String>,
+}
+
+/// Other names of models.
+const ALSO: [(&str, &str); 2] = [
+    ("cook-torrance + blinn-phong", "mixture"),
+    ("cook-torrance-ggx + blinn-phong", "mixture-ggx"),
+];
+
+/// A curve to fit: by name, or as it was measured with a radar.
+pub(crate) enum What<'a> {
+    Named(&'a str),
+    Curve(Box<FitSubject>, Instrument),
+}
+
+/// How to fit, as Python says it.
+pub(crate) struct Request<'a, 'py> {
+    pub(crate) model: Option<&'a str>,
+    pub(crate) method: &'a str,
+    pub(crate) curve: Option<&'a str>,
+    pub(crate) fixed: Option<&'a Bound<'py, PyDict>>,
+    pub(crate) looks: Option<f64>,
+    pub(crate) noise_dbm: Option<f64>,
+    pub(crate) starts: Option<usize>,
+    pub(crate) seed: Option<u64>,
+}
+
+impl Request<'_, '_> {
+    /// Fits; materials are looked for in a database.
+    pub(crate) fn run(
+        &self,
+        py: Python<'_>,
+        what: What<'_>,
+        db: Option<&Database>,
+    ) -> PyResult<Fit> {
+        let Request { curve, looks, noise_dbm, starts, seed, .. } = *self;
+        let method = match self.method {
+            "censored" => FitMethod::Censored,
+            "tls" => FitMethod::Tls,
+            "tls-tail" => FitMethod::TlsTail,
+            "mse" => FitMethod::Mse,
+            other => {
+                let known = "censored, tls, tls-tail and mse";
+                let problem = format!("there is no method `{other}`; there are {known}");
+                return Err(PyValueError::new_err(problem));
+            }
+        };
+        let fixed = self.fixed.map_or(Ok(Vec::new()), |fixed| {
+            let held = fixed.iter().map(|(path, value)| Ok((path.extract()?, value.extract()?)));
+            held.collect::<PyResult<Vec<(String, f64)>>>()
+        })?;
+        let own = |name: &str| ALSO.into_iter().find(|(other, _)| *other == name);
+        let model = self.model.map(|name| own(name).map_or(name, |(_, own)| own));
+        let database = db.map_or_else(|| setup::Database::new(None), Database::database);
+        let fitted = py.detach(|| {
+            // Without a database, one that happens to lie in the working directory is not read.
+            let store = db.map(|_| database.read()).transpose()?.flatten();
+            let (name, given) = match what {
+                What::Named(name) => (name, None),
+                What::Curve(subject, instrument) => ("", Some((*subject, instrument))),
+            };
+            let usual = FitRequest::new(name);
+            let request = FitRequest {
+                model,
+                method,
+                curve,
+                fixed,
+                looks,
+                noise_w: noise_dbm.map(watts_from_dbm),
+                starts: starts.unwrap_or(usual.starts),
+                seed: seed.unwrap_or(usual.seed),
+                ..usual
+            };
+            let (checked, instrument) = match given {
+                None => (request.check(store.as_ref())?, None),
+                Some((subject, instrument)) => {
+                    (request.check_subject(subject, store.as_ref())?, Some(instrument))
+                }
+            };
+            let (notices, fit_name) = (checked.notices.clone(), checked.fit_name.clone());
+            drop(store);
+            let FitOutcome { subject, result, refusal, .. } = checked.run(&database)?;
+            let fit = Fit { result, subject, fit_name, instrument, notices };
+            refusal.map_or(Ok(fit), Err)
+        });
+        fitted.map_err(raised::<Error>)
+    }
 }
 
 /// Fits a scattering model to a curve, on all cores. Nothing is stored.
@@ -74,45 +164,8 @@ pub(crate) fn fit(
     starts: Option<usize>,
     seed: Option<u64>,
 ) -> PyResult<Fit> {
-    let method = match method {
-        "censored" => FitMethod::Censored,
-        "tls" => FitMethod::Tls,
-        "tls-tail" => FitMethod::TlsTail,
-        "mse" => FitMethod::Mse,
-        other => {
-            let known = "censored, tls, tls-tail and mse";
-            let problem = format!("there is no method `{other}`; there are {known}");
-            return Err(PyValueError::new_err(problem));
-        }
-    };
-    let fixed = fixed.map_or(Ok(Vec::new()), |fixed| {
-        let held = fixed.iter().map(|(path, value)| Ok((path.extract()?, value.extract()?)));
-        held.collect::<PyResult<Vec<(String, f64)>>>()
-    })?;
-    let what = what.to_string_lossy();
-    let database = db.map_or_else(|| setup::Database::new(None), Database::database);
-    let fitted = py.detach(|| {
-        let usual = FitRequest::new(&what);
-        let request = FitRequest {
-            model,
-            method,
-            curve,
-            fixed,
-            looks,
-            noise_w: noise_dbm.map(watts_from_dbm),
-            starts: starts.unwrap_or(usual.starts),
-            seed: seed.unwrap_or(usual.seed),
-            ..usual
-        };
-        // Without a database, one that happens to lie in the working directory is not read.
-        let store = db.map(|_| database.read()).transpose()?.flatten();
-        let checked = request.check(store.as_ref())?;
-        let notices = checked.notices.clone();
-        drop(store);
-        let FitOutcome { subject, result, refusal, .. } = checked.run(&database)?;
-        refusal.map_or(Ok(Fit { result, label: subject.label, notices }), Err)
-    });
-    fitted.map_err(raised::<Error>)
+    let request = Request { model, method, curve, fixed, looks, noise_dbm, starts, seed };
+    request.run(py, What::Named(&what.to_string_lossy()), db)
 }
 
 #[pymethods]
@@ -125,6 +178,42 @@ impl Fit {
             values.set_item(parameter.path, parameter.value)?;
         }
         Ok(values)
+    }
+
+    /// Names of the fitted numbers, in the order of `covariance`.
+    #[getter]
+    fn names(&self) -> Vec<&str> {
+        self.result.estimates.iter().map(|one| one.name.as_str()).collect()
+    }
+
+    /// Covariance of the fitted numbers: float64 (n, n), 0 for those at a bound, without directions that the curve does
+    /// not determine.
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        Ok(PyArray2::from_vec2(py, &self.result.covariance)?)
+    }
+
+    /// The curve and the fitted law over it, on axes of matplotlib.
+    #[pyo3(signature = (ax = None))]
+    fn plot<'py>(
+        slf: &Bound<'py, Self>,
+        ax: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("matdb._plots")?.call_method1("fit", (slf, ax))
+    }
+
+    /// Angles of incidence of the curve, degrees: float64 (n,).
+    #[getter]
+    fn theta_deg<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let rows = self.subject.curve.observations.iter();
+        PyArray1::from_iter(py, rows.map(|row| row.theta_i_rad.to_degrees()))
+    }
+
+    /// Levels of the curve, dB: float64 (n,), NaN where nothing was detected.
+    #[getter]
+    fn levels_db<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let rows = self.subject.curve.observations.iter();
+        PyArray1::from_iter(py, rows.map(|row| row.sigma0.map_or(f64::NAN, |r| 10.0 * r.log10())))
     }
 
     /// What limits the use of the fit, a sentence each: what the curve cannot tell apart, and bounds that were met.
@@ -156,6 +245,6 @@ impl Fit {
     }
 
     fn __repr__(&self) -> String {
-        format!("<matdb.Fit of {}>", self.label)
+        format!("<matdb.Fit of {} to {}>", self.fit_name, self.subject.label)
     }
 }

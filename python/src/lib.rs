@@ -3,7 +3,9 @@
 
 #![warn(missing_docs)]
 
+mod cloud;
 mod command;
+mod compare;
 mod database;
 mod diagnose;
 mod error;
@@ -21,11 +23,15 @@ mod _matdb {
     use pyo3::prelude::*;
 
     #[pymodule_export]
+    use crate::cloud::Cloud;
+    #[pymodule_export]
     use crate::command::_run;
+    #[pymodule_export]
+    use crate::compare::{Comparison, calibrate, compare};
     #[pymodule_export]
     use crate::database::{Database, open};
     #[pymodule_export]
-    use crate::diagnose::diagnose;
+    use crate::diagnose::{Diagnosis, diagnose};
     #[pymodule_export]
     use crate::error::{
         Error, FileError, MaterialError, RenderError, SceneError, StoreError, UsageError,
@@ -37,7 +43,7 @@ mod _matdb {
     #[pymodule_export]
     use crate::measure::{Measurement, measure};
     #[pymodule_export]
-    use crate::scan::{Scan, View, render};
+    use crate::scan::{Page, Scan, View, render};
     #[pymodule_export]
     use crate::scene::{Scene, load_scene};
 

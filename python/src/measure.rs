@@ -2,33 +2,47 @@
 
 use std::path::{Path, PathBuf};
 
+use matdb::adopt::FitSubject;
 use matdb::error::Error;
 use matdb::files::write_all;
 use matdb::material::Observation;
-use matdb::measure::{CloudReading, Reduction, Registration, Start};
+use matdb::measure::{Reduction, Registration, Start};
 use matdb::report::{MeasurementReport, MeasurementRequest};
-use matdb::setup::{read_cloud, read_pose};
+use matdb::setup::read_pose;
+use matdb::units::watts_from_dbm;
 use numpy::PyArray1;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
+use crate::cloud::CloudLike;
 use crate::error::raised;
+use crate::fit::{Fit, Request, What};
 use crate::json::to_python;
-use crate::scene::Scene;
+use crate::scene::SceneLike;
 
 /// A measured cloud at its place on the target, and its curve.
 #[pyclass(frozen, module = "matdb")]
 pub(crate) struct Measurement {
     report: MeasurementReport,
     name: String,
+    instrument: Instrument,
+}
+
+/// The radar that a curve was measured with.
+#[derive(Clone)]
+pub(crate) struct Instrument {
+    pub(crate) name: String,
+    pub(crate) frequency_hz: f64,
+    pub(crate) threshold_w: f64,
 }
 
 /// Registers a measured cloud to a scene, and reduces it to a curve of backscatter over the angle of incidence.
 ///
 /// Parameters
 /// ----------
-/// cloud : str or os.PathLike
-///     The cloud's file: `.ply`, `.csv`, `.xyz`, `.pcd`, `.las` or `.laz`.
-/// scene : Scene
+/// cloud : Cloud, str or os.PathLike
+///     The cloud, or its file: `.ply`, `.csv`, `.xyz`, `.pcd`, `.las` or `.laz`.
+/// scene : Scene, str or os.PathLike
 ///     What was measured.
 /// region : str, optional
 ///     Only this region of the scene.
@@ -42,11 +56,13 @@ pub(crate) struct Measurement {
 #[pyo3(signature = (cloud, scene, *, region = None, pose = None))]
 pub(crate) fn measure(
     py: Python<'_>,
-    cloud: PathBuf,
-    scene: &Scene,
+    cloud: CloudLike,
+    scene: SceneLike,
     region: Option<&str>,
     pose: Option<PathBuf>,
 ) -> PyResult<Measurement> {
+    let scene = scene.scene(py)?;
+    let scene = scene.get();
     let measured = py.detach(|| {
         let start = match pose {
             None => Start::default(),
@@ -54,16 +70,21 @@ pub(crate) fn measure(
             Some(file) => Start::Given(read_pose(&file)?),
         };
         let request = MeasurementRequest {
-            cloud_file: &cloud,
-            cloud: &read_cloud(&cloud, &CloudReading::default())?,
+            cloud_file: cloud.path(),
+            cloud: &cloud.read()?,
             scene_file: scene.path(),
             scene: scene.scene(),
             registration: Registration { start, keep_given: true, ..Registration::default() },
             region,
             reduction: Reduction::default(),
         };
-        let name = scene.scene().file.name.clone();
-        request.run().map(|report| Measurement { report, name })
+        let (name, radar) = (scene.scene().file.name.clone(), scene.scene().radar());
+        let instrument = Instrument {
+            name: radar.preset.clone(),
+            frequency_hz: radar.centre_frequency_ghz * 1e9,
+            threshold_w: watts_from_dbm(radar.threshold_dbm),
+        };
+        request.run().map(|report| Measurement { report, name, instrument })
     });
     measured.map_err(raised::<Error>)
 }
@@ -101,6 +122,35 @@ impl Measurement {
     #[getter]
     fn threshold_db<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.column(py, |row| level_db(row.threshold_sigma0))
+    }
+
+    /// Fits a scattering model to the curve, as `matdb.fit` does.
+    #[pyo3(signature = (model = None, *, method = "censored", fixed = None, looks = None, noise_dbm = None,
+                        starts = None, seed = None))]
+    #[expect(clippy::too_many_arguments, reason = "each is a keyword in Python")]
+    fn fit(
+        &self,
+        py: Python<'_>,
+        model: Option<&str>,
+        method: &str,
+        fixed: Option<&Bound<'_, PyDict>>,
+        looks: Option<f64>,
+        noise_dbm: Option<f64>,
+        starts: Option<usize>,
+        seed: Option<u64>,
+    ) -> PyResult<Fit> {
+        let request = Request { model, method, curve: None, fixed, looks, noise_dbm, starts, seed };
+        let subject = FitSubject::of_curve(self.report.reduced.curve.clone(), "curve");
+        request.run(py, What::Curve(Box::new(subject), self.instrument.clone()), None)
+    }
+
+    /// The curve over the angle of incidence, on axes of matplotlib.
+    #[pyo3(signature = (ax = None))]
+    fn plot<'py>(
+        slf: &Bound<'py, Self>,
+        ax: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("matdb._plots")?.call_method1("measurement", (slf, ax))
     }
 
     /// Pose with its covariance, how the registration ended, and what became of the points, as `pose.json` has it.

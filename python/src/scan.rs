@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-use matdb::files::write_all;
-use matdb::formats::ply::{Column, Scalar};
+use matdb::files::{folder_of, write_all};
+use matdb::formats::ply::{Column, Scalar, Table};
 use matdb::geometry::Raster;
 use matdb::render::{Echo, cloud_table};
-use matdb::report::{RenderFiles, RenderRequest};
+use matdb::report::{RenderFiles, RenderRequest, rendering_page};
 use matdb::setup::{ReadyScene, View as Received};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::PyKeyError;
@@ -39,6 +39,16 @@ pub(crate) struct Scan {
     views: Vec<(String, Py<View>)>,
     chirps: usize,
     notices: Vec<String>,
+    /// What [`Scan::show`] draws: scene, names of its materials, cloud and image of the radar's own view.
+    scene: Py<Scene>,
+    materials: Vec<String>,
+    shown: Option<(Table, Raster)>,
+}
+
+/// A page that stands alone, for a browser or a notebook.
+#[pyclass(frozen, module = "matdb")]
+pub(crate) struct Page {
+    html: String,
 }
 
 /// Renders a scene on all cores. Ctrl-C ends it.
@@ -66,26 +76,34 @@ pub(crate) fn render(
         .map(|seed| {
             let changes = PyDict::new(py);
             changes.set_item("seed", seed)?;
-            scene.get().with(py, &changes)
+            Bound::new(py, scene.get().with(py, &changes)?)
         })
         .transpose()?;
-    let scene = with_seed.as_ref().unwrap_or_else(|| scene.get());
+    let own = with_seed.as_ref().unwrap_or(scene);
+    let scene = own.get();
     let store = db.map_or(Ok(None), Database::store)?;
     let ready =
         ReadyScene::new(scene.scene.clone(), &scene.path, store.as_ref()).map_err(raised)?;
     drop(store);
     let request = RenderRequest::new(&ready);
     let rendered = interruptible(py, |stop| request.render(&|_| stop.check()))?;
-    Scan::new(py, &ready, rendered.map_err(raised)?)
+    Scan::new(py, own, &ready, rendered.map_err(raised)?)
 }
 
 impl Scan {
-    fn new(py: Python<'_>, ready: &ReadyScene, rendered: RenderFiles<'_>) -> PyResult<Scan> {
-        let mut views = Vec::new();
+    fn new(
+        py: Python<'_>,
+        scene: &Bound<'_, Scene>,
+        ready: &ReadyScene,
+        rendered: RenderFiles<'_>,
+    ) -> PyResult<Scan> {
+        let (mut views, mut shown) = (Vec::new(), None);
         for (view, image) in std::iter::zip(&rendered.views, rendered.images) {
+            let table = table(ready, view);
+            shown = shown.or_else(|| Some((table.clone(), image.clone())));
             let name = view.file_name("view", "");
             let name = name.trim_end_matches('.').replacen("view", "radar", 1);
-            views.push((name, Py::new(py, View::new(py, ready, view, image)?)?));
+            views.push((name, Py::new(py, View::new(py, table, view.scan.threshold_w, image)?)?));
         }
         Ok(Scan {
             name: ready.scene.file.name.clone(),
@@ -93,6 +111,9 @@ impl Scan {
             views,
             chirps: ready.scene.chirps.rays.len(),
             notices: ready.notices(),
+            scene: scene.clone().unbind(),
+            materials: ready.materials.iter().map(|material| material.name.clone()).collect(),
+            shown,
         })
     }
 
@@ -103,18 +124,7 @@ impl Scan {
 }
 
 impl View {
-    fn new(
-        py: Python<'_>,
-        ready: &ReadyScene,
-        view: &Received<'_>,
-        raster: Raster,
-    ) -> PyResult<View> {
-        let regions: Vec<&str> =
-            ready.scene.target.regions.iter().map(|region| region.name.as_str()).collect();
-        let materials: Vec<&str> =
-            ready.materials.iter().map(|material| material.name.as_str()).collect();
-        let detections: Vec<&Echo> = view.scan.detections().collect();
-        let table = cloud_table(&detections, &ready.material_of_region, &regions, &materials, true);
+    fn new(py: Python<'_>, table: Table, threshold_w: f64, raster: Raster) -> PyResult<View> {
         let cloud = PyDict::new(py);
         for column in table.columns {
             let name = column.name.clone();
@@ -138,7 +148,7 @@ impl View {
             cloud: cloud.unbind(),
             x_m: x_m.unbind(),
             y_m: y_m.unbind(),
-            threshold_w: view.scan.threshold_w,
+            threshold_w,
         })
     }
 
@@ -149,6 +159,16 @@ impl View {
     fn column<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
         self.cloud.bind(py).as_any().get_item(name)
     }
+}
+
+/// The detections of a view with every column.
+fn table(ready: &ReadyScene, view: &Received<'_>) -> Table {
+    let regions: Vec<&str> =
+        ready.scene.target.regions.iter().map(|region| region.name.as_str()).collect();
+    let materials: Vec<&str> =
+        ready.materials.iter().map(|material| material.name.as_str()).collect();
+    let detections: Vec<&Echo> = view.scan.detections().collect();
+    cloud_table(&detections, &ready.material_of_region, &regions, &materials, true)
 }
 
 /// An array that nobody may write: it is shared.
@@ -323,6 +343,25 @@ impl Scan {
         py.detach(|| write_all(&folder, &self.files)).map_err(raised)
     }
 
+    /// The detections in three dimensions, with target, radar and image, as a page. A notebook shows it.
+    fn show(&self, py: Python<'_>) -> PyResult<Page> {
+        let Some((cloud, image)) = &self.shown else { return Err(PyKeyError::new_err("no view")) };
+        let materials: Vec<&str> = self.materials.iter().map(String::as_str).collect();
+        let scene = &self.scene.get().scene;
+        let bytes =
+            py.detach(|| rendering_page(scene, cloud, image, &materials)).map_err(raised)?;
+        Ok(Page { html: String::from_utf8(bytes)? })
+    }
+
+    /// The power image, on axes of matplotlib.
+    #[pyo3(signature = (ax = None))]
+    fn plot<'py>(
+        slf: &Bound<'py, Self>,
+        ax: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("matdb._plots")?.call_method1("scan", (slf, ax))
+    }
+
     /// The picture, for a notebook.
     fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         self.file(py, "power.png")
@@ -331,5 +370,36 @@ impl Scan {
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         let detections = self.radar(py)?.get().__len__(py)?;
         Ok(format!("<matdb.Scan {}: {detections} detections of {} chirps>", self.name, self.chirps))
+    }
+}
+
+#[pymethods]
+impl Page {
+    /// The whole page.
+    #[getter]
+    fn html(&self) -> &str {
+        &self.html
+    }
+
+    /// Writes the page to a file.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        py.detach(|| write_all(folder_of(&path), &[(name, self.html.clone().into_bytes())]))
+            .map_err(raised)
+    }
+
+    /// The page in a frame, for a notebook.
+    fn _repr_html_(&self) -> String {
+        let page = self.html.replace('&', "&amp;").replace('"', "&quot;");
+        format!(
+            "<iframe srcdoc=\"{page}\" width=\"100%\" height=\"640\" style=\"border:0\"></iframe>"
+        )
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "<matdb.Page of {} kB: a notebook shows it, save(path) writes it>",
+            self.html.len() / 1000
+        )
     }
 }

@@ -30,6 +30,10 @@ impl Scene {
         &self.path
     }
 
+    pub(crate) fn own_text(&self) -> &str {
+        &self.text
+    }
+
     pub(crate) fn scene(&self) -> &scene::Scene {
         &self.scene
     }
@@ -44,6 +48,22 @@ impl Scene {
         }
         let text = table.to_string();
         py.detach(|| Scene::new(text, &self.path)).map_err(raised)
+    }
+}
+
+/// A scene as an argument: itself, or its file.
+#[derive(FromPyObject)]
+pub(crate) enum SceneLike {
+    Scene(Py<Scene>),
+    File(PathBuf),
+}
+
+impl SceneLike {
+    pub(crate) fn scene(self, py: Python<'_>) -> PyResult<Py<Scene>> {
+        match self {
+            SceneLike::Scene(scene) => Ok(scene),
+            SceneLike::File(path) => Py::new(py, load_scene(py, path)?),
+        }
     }
 }
 

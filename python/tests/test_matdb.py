@@ -222,15 +222,121 @@ def test_a_diagnosis_is_that_of_the_command_line(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     md.render(md.load_scene("builtin:concealed")).save("out")
     Path("bench.toml").write_text(md.load_scene("builtin:bench").text)
-    why = md.diagnose("out/cloud.ply", "bench.toml", "why", controls=False)
-    assert [effect["name"] for effect in why["effects"]] == ["foreign-patch"]
+    why = md.diagnose("out/cloud.ply", "bench.toml", controls=False)
+    assert why.verdict == "explained" and [effect["name"] for effect in why.effects] == ["foreign-patch"]
+    assert why.after["rmse_db"] < why.before["rmse_db"]
+    assert repr(why) == "<matdb.Diagnosis: explained foreign-patch>"
+    why.save("why")
     words = ["diagnose", "out/cloud.ply", "--scene", "bench.toml", "-o", "by-command", "--no-controls", "--json", "-q"]
     done = command(tmp_path, *words)
-    assert json.loads(done.stdout) == why
-    assert Path("why/report.html").exists()
+    assert json.loads(done.stdout) == why.to_dict()
+    of_words = ["report.html", "after.toml"]  # these name the folder
+    by_hand, by_command = files("why"), files("by-command")
+    assert by_hand.keys() == by_command.keys()
+    assert all(by_hand[name] == by_command[name] for name in by_hand if name not in of_words)
+    # The points alone, and a scene that is in no file.
+    points = md.Cloud.load("out/cloud.ply")
+    scan = md.render(md.load_scene("builtin:concealed"))
+    arrays = md.Cloud(scan.xyz_m, scan.points_dbm, chirp=scan.cloud["chirp"], range_m=scan.cloud["range_m"])
+    assert len(points) == len(arrays) and np.allclose(points.xyz_m, arrays.xyz_m, atol=1e-6)
+    again = md.diagnose(arrays, md.load_scene("builtin:bench").replace(name="Bench of arrays"), controls=False)
+    assert [effect["name"] for effect in again.effects] == ["foreign-patch"]
+    again.report("pages/of arrays.html")
+    assert "Bench of arrays" in Path("pages/of arrays.html").read_text() and len(files("pages")) == 1
     with pytest.raises(md.Error, match="nothing.ply"):
-        md.diagnose("nothing.ply", "bench.toml", "nowhere")
-    assert not Path("nowhere").exists()
+        md.diagnose("nothing.ply", "bench.toml")
+    with pytest.raises(ValueError, match="give \\(n, 3\\)"):
+        md.Cloud([[0, 0, 1]], [-40, -50])
+    with pytest.raises(md.Error, match="the cloud has no points"):
+        md.Cloud(np.zeros((0, 3)), [])
+
+
+def test_a_fit_of_arrays_becomes_a_material(scene):
+    scan = md.render(scene)
+    curve = md.measure(md.Cloud(scan.xyz_m, scan.points_dbm), scene, region="all")
+    fit = curve.fit("lambert", seed=2)
+    assert fit.names[0] == "albedo" and fit.covariance.shape == (len(fit.names),) * 2
+    assert np.all(np.isfinite(fit.covariance))
+    db = md.open("mine.sqlite")
+    assert db.add("my-plate", fit, source="A test, 2026", licence="CC0-1.0", kind="synthetic") == ["my-plate@1"]
+    assert db["my-plate"].sigma0_db([10])[0] == fit.sigma0_db([10])[0]
+    assert db.add("my-plate", curve.fit("lambert", seed=3), source="A test, 2026", licence="CC0-1.0", kind="synthetic")
+    assert db.check()["findings"] == []
+    with pytest.raises(md.Error, match="licence"):
+        db.add("another", fit, source="A test, 2026")
+    with pytest.raises(md.UsageError, match="kind"):
+        db.add("another", fit, source="A test, 2026", licence="CC0-1.0", kind="guessed")
+    assert "another" not in db
+    both = curve.fit("cook-torrance + blinn-phong", fixed={"diffuse.alpha": 1.0})
+    assert "specular.m" in both.parameters
+
+
+def test_a_scan_is_shown_and_plotted(scene):
+    import matplotlib
+
+    matplotlib.use("Agg")
+    scan = md.render(scene)
+    page = scan.show()
+    assert page.html.lower().startswith("<!doctype html>") and "https://" not in page.html and "mannequin-paint" in page.html
+    page.save("pages/view.html")
+    assert Path("pages/view.html").read_text() == page.html
+    assert page._repr_html_().startswith("<iframe srcdoc=")
+    said = command(Path.cwd(), "render", "plate.toml", "-o", "out", "--view")
+    assert said.returncode == 0, said.stderr
+    assert Path("out/view.html").exists()
+    curve = md.measure(md.Cloud(scan.xyz_m, scan.points_dbm), scene)
+    for axes in [scan.plot(), curve.plot(), curve.fit("lambert").plot()]:
+        assert axes.get_xlabel() and axes.get_ylabel()
+
+
+def test_comparing_and_calibrating_are_those_of_the_command_line(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    plate = md.load_scene("builtin:calibration-plate")
+    md.render(plate).save("out")
+
+    def said(*words):
+        done = command(tmp_path, *words, "--json", "-q")
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout)
+
+    where = ["out/cloud.ply", "--scene", "builtin:calibration-plate"]
+    assert md.calibrate("out/cloud.ply", plate) == said("calibrate", *where)
+    compared = md.compare("out/cloud.ply", plate)
+    assert compared.record == said("compare", *where, "-o", "by-command")
+    compared.save("by-hand")
+    assert files("by-hand") == files("by-command")
+    assert compared.measured_dbm.shape == compared.simulated_dbm.shape
+    with pytest.raises(md.UsageError, match="give dB from 6 to 60"):
+        md.calibrate("out/cloud.ply", plate, within_db=1)
+    db = md.open()
+    assert db.predict("cotton", [0, 10, 20]) == said("predict", "cotton", "--angles", "0,10,20")
+    with pytest.raises(md.UsageError, match="90"):
+        db.predict("cotton", [95.0])
+
+
+# The lines of a first afternoon, in an empty folder.
+AFTERNOON = """
+db    = md.open("matdb.sqlite")
+scene = md.load_scene("builtin:concealed")
+scan  = md.render(scene, db=db, seed=7)
+img   = scan.power_dbm
+cloud = scan.cloud
+scan
+scan.save("out/")
+
+points = md.Cloud(scan.xyz_m, scan.points_dbm)
+curve  = md.measure(points, scene, region="skin")
+fit    = curve.fit("cook-torrance + blinn-phong")
+db.add("my-skin", fit, source="My bench, 2026", licence="CC-BY-4.0")
+why    = md.diagnose(points, scene)
+"""
+
+
+def test_a_first_afternoon(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    said = {"md": md}
+    exec(AFTERNOON, said)
+    assert list(said["db"]) == ["my-skin"] and said["why"].verdict == "no-missing-effect"
 
 
 def test_types_are_those_that_the_stubs_say(tmp_path):

@@ -138,6 +138,18 @@ impl<'a> FitRequest<'a> {
     /// A curve, a material or a model that is not known; settings that do not suit them; what cannot be stored.
     pub fn check(self, store: Option<&Store>) -> Result<CheckedFit, Error> {
         let subject = FitSubject::open(self.what, self.curve, &self.columns, store)?;
+        self.check_subject(subject, store)
+    }
+
+    /// As [`FitRequest::check`], of a curve that is loaded.
+    ///
+    /// # Errors
+    /// As [`FitRequest::check`].
+    pub fn check_subject(
+        self,
+        subject: FitSubject,
+        store: Option<&Store>,
+    ) -> Result<CheckedFit, Error> {
         let start = self.start(&subject, store)?;
         let fit = self.settings(&subject, &start)?;
         let fit_name = self.name(&start);

@@ -81,13 +81,8 @@ impl FitStorage {
         store.record(activity("fit", &files)?);
         let Target { mut material, curve, source } =
             self.target(subject, fit_name, Some(&store))?;
-        let mut fit = found.stored(fit_name, &curve, &source);
-        fit.parameter_sources = add_parameter_sources(&mut material, found);
-        replace_fit(&mut material, fit);
-        let is_open = found.verdict.iter().any(Finding::leaves_the_curve_open);
-        if !self.keep_render && !is_open {
-            fit_name.clone_into(&mut material.render);
-        }
+        let names = [&*curve, &*source];
+        let is_open = render_fit(&mut material, found, fit_name, names, self.keep_render);
         let added = store.add([&material])?;
         Ok(StoredFit {
             material: material.slug.to_string(),
@@ -179,6 +174,25 @@ impl FitStorage {
             add_curve(&mut material, &subject.curve_name, &subject.curve, &self.origin)?;
         Ok(Target { material, curve, source })
     }
+}
+
+/// Adds a fit of a curve with this name and source to a material, which renders it from now on, unless it keeps what it
+/// renders or the fit leaves the curve open; whether it does.
+pub(super) fn render_fit(
+    material: &mut Material,
+    found: &FitResult,
+    fit_name: &str,
+    [curve, source]: [&str; 2],
+    keep_render: bool,
+) -> bool {
+    let mut fit = found.stored(fit_name, curve, source);
+    fit.parameter_sources = add_parameter_sources(material, found);
+    replace_fit(material, fit);
+    let is_open = found.verdict.iter().any(Finding::leaves_the_curve_open);
+    if !keep_render && !is_open {
+        fit_name.clone_into(&mut material.render);
+    }
+    is_open
 }
 
 fn curve_of<'a>(material: &'a Material, name: &str) -> Option<&'a Curve> {

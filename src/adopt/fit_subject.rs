@@ -51,6 +51,19 @@ impl FitSubject {
         }
     }
 
+    /// A curve that is in no file and no material yet, with a name for it.
+    pub fn of_curve(curve: Curve, name: &str) -> FitSubject {
+        FitSubject {
+            wanted: name.to_owned(),
+            label: name.to_owned(),
+            curve_name: name.to_owned(),
+            curve,
+            found: None,
+            file: None,
+            notices: Vec::new(),
+        }
+    }
+
     fn of_file(
         path: &Path,
         curve: Option<&str>,

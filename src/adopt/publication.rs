@@ -1,7 +1,7 @@
 //! Everything that a diagnosis leaves behind: the report, the scene with what was found, and files or stored
 //! revisions of the materials that receive it.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::provenance::activity;
 use super::recipients::{Adoption, Recipient, pinned_name, replaced_name};
@@ -261,8 +261,7 @@ impl<'a> Publication<'a> {
         let others = further.iter().map(|one| (&one.ready.scene, &*one.path, &one.text));
         let mut scenes: Vec<DiagnosedScene> = Vec::new();
         for (cloud, (scene, path, text)) in (0..).zip([first].into_iter().chain(others)) {
-            let real = path.canonicalize().ok();
-            let is_it = |known: &&mut DiagnosedScene| known.path.canonicalize().ok() == real;
+            let is_it = |known: &&mut DiagnosedScene| real(known.path) == real(path);
             match scenes.iter_mut().find(is_it) {
                 Some(known) => known.clouds.push(cloud),
                 None => scenes.push(DiagnosedScene { scene, path, text, clouds: vec![cloud] }),
@@ -345,7 +344,12 @@ impl<'a> Publication<'a> {
 
     /// The command and the files that it was given.
     fn activity(&self) -> Result<Activity, Error> {
-        Ok(activity("diagnose", &self.checked.request.inputs())?)
+        let CheckedRequest { request, given, .. } = self.checked;
+        let command = "diagnose";
+        if given.is_empty() {
+            return Ok(activity(command, &request.inputs())?);
+        }
+        Ok(Activity { command: command.to_owned(), inputs: given.clone(), origin: None })
     }
 
     /// Where the stored numbers come from: files of one name differ by what is in them.
@@ -370,6 +374,11 @@ impl DiagnosedScene<'_> {
         })?;
         Ok((head.to_owned() + &text).into_bytes())
     }
+}
+
+/// A path without links and detours; that of a built-in scene, which is no file, as it is.
+fn real(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }
 
 /// The materials at these places with what adding them did.

@@ -11,6 +11,7 @@ use crate::diagnose::{
 use crate::effects::{About, Antenna, BeamSpot, Effect, RangeCell, SecondBounce, Setting, library};
 use crate::error::Error;
 use crate::files::folder_of;
+use crate::material::Input;
 use crate::measure::{Cloud, CloudError};
 use crate::radar::{Pattern, Radar, RadarError, Receiver, Returns};
 use crate::report::{Choice, Measurands, Reason};
@@ -67,6 +68,8 @@ pub struct CheckedRequest<'a> {
     pub recipient: Option<usize>,
     /// Effects to try, and the others.
     pub choice: Choice,
+    /// What the clouds and scenes were made of, where these are no files; else empty.
+    pub given: Vec<Input>,
 }
 
 /// The scene of a further cloud.
@@ -114,8 +117,19 @@ impl<'a> CloudRequest<'a> {
     /// A scene that cannot be loaded or declares what no diagnosis predicts; a folder with files of somebody else;
     /// effects or a material that do not suit the scene.
     pub fn check(self, store: Option<&Store>) -> Result<CheckedRequest<'a>, Error> {
-        let scene_text = read_text(self.scene)?;
-        let scene = Scene::load(self.scene)?;
+        self.check_scene(Scene::load(self.scene)?, read_text(self.scene)?, store)
+    }
+
+    /// As [`CloudRequest::check`], of a scene that is loaded, with the text of its file; that need not be what the file has.
+    ///
+    /// # Errors
+    /// As [`CloudRequest::check`].
+    pub fn check_scene(
+        self,
+        scene: Scene,
+        scene_text: String,
+        store: Option<&Store>,
+    ) -> Result<CheckedRequest<'a>, Error> {
         let antenna = self.receiver.map(|name| self.antenna(&scene, name)).transpose()?;
         check_predicted(&scene, self.scene, antenna)?;
         let ready = ReadyScene::new(scene, self.scene, store)?;
@@ -133,7 +147,17 @@ impl<'a> CloudRequest<'a> {
         let scenes: Vec<&ReadyScene> =
             [&ready].into_iter().chain(further.iter().map(|one| &one.ready)).collect();
         let choice = self.choose_effects(&scenes)?;
-        Ok(CheckedRequest { request: self, ready, antenna, scene_text, further, recipient, choice })
+        let given = Vec::new();
+        Ok(CheckedRequest {
+            request: self,
+            ready,
+            antenna,
+            scene_text,
+            further,
+            recipient,
+            choice,
+            given,
+        })
     }
 
     /// The antenna of a receiver of the scene.

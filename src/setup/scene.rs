@@ -118,7 +118,19 @@ impl ReadyScene {
         pose: Pose<Global, Global>,
         store: Option<&Store>,
     ) -> Result<ReadyScene, Error> {
-        let mut scene = Scene::load(path)?;
+        ReadyScene::new_mean(Scene::load(path)?, path, pose, store)
+    }
+
+    /// As [`open_mean`](Self::open_mean), of a scene that was loaded from `path` and may have been changed since.
+    ///
+    /// # Errors
+    /// A material or effect that cannot be loaded, by the file and place that name it.
+    pub fn new_mean(
+        mut scene: Scene,
+        path: &Path,
+        pose: Pose<Global, Global>,
+        store: Option<&Store>,
+    ) -> Result<ReadyScene, Error> {
         let radar = &mut scene.file.radar;
         (radar.receiver, radar.speckle, radar.noise) = (None, None, None);
         for vertex in &mut scene.target.mesh.vertices {

@@ -1,0 +1,73 @@
+//! A new material of a measured curve and its fit.
+
+use std::path::Path;
+
+use super::admission;
+use super::fit_storage::{FitStorage, StoredFit, render_fit};
+use super::fit_subject::FitSubject;
+use crate::catalogue::exchange::{Details, Foreign};
+use crate::error::Error;
+use crate::fit::FitResult;
+use crate::material::Activity;
+use crate::setup::{Database, find_material};
+use crate::store::Store;
+
+/// A fit with its curve, for a material that need not be there yet.
+pub struct FittedMaterial<'a> {
+    /// What was fitted.
+    pub subject: &'a FitSubject,
+    /// The fit.
+    pub result: &'a FitResult,
+    /// Name of the fit.
+    pub fit_name: &'a str,
+    /// What a new material states, with its name.
+    pub details: Details,
+    /// How a material that is there gets it.
+    pub storage: FitStorage,
+}
+
+impl FittedMaterial<'_> {
+    /// Stores the fit as a new revision of the material, or makes the material with curve and fit.
+    ///
+    /// # Errors
+    /// Details that a new material lacks; what [`FitStorage`] refuses of one that is there; a fit that did not converge;
+    /// a database that cannot be written.
+    pub fn store(self, database: &Database) -> Result<StoredFit, Error> {
+        let FittedMaterial { subject, result, fit_name, details, storage } = self;
+        if !result.converged || result.model.validate().is_err() {
+            let curve = subject.label.clone();
+            return Err(Error::NotConverged { curve, stop: result.stop.as_str() });
+        }
+        let name = details.slug.as_ref().map(ToString::to_string).unwrap_or_default();
+        // The first material makes the file.
+        let there = Store::open_existing(database.path())?;
+        let found = find_material(there.as_ref(), &name, "");
+        let is_known =
+            subject.found.is_some() || !matches!(found, Err(Error::UnknownMaterial { .. }));
+        if is_known {
+            return storage.save(subject, fit_name, result, database);
+        }
+        let details = Details { curve: Some(subject.curve_name.clone()), ..details };
+        let (mut material, _) =
+            Foreign::Csv.read(&subject.label, &subject.curve.write(), &details)?;
+        let [curve] = &material.curves[..] else {
+            return Err(Error::usage("the curve has no point", "measure again"));
+        };
+        let (curve, source) = (curve.name.clone(), curve.source.clone());
+        let is_open = render_fit(&mut material, result, fit_name, [&curve, &source], false);
+        admission::check(&material, Path::new(&subject.label))?;
+        let mut store = database.write()?;
+        let inputs = Vec::new();
+        store.record(Activity { command: "fit".to_owned(), inputs, origin: None });
+        let added = store.add([&material])?;
+        Ok(StoredFit {
+            material: name,
+            revision: added.first().map_or(1, |added| added.revision()),
+            fit: fit_name.to_owned(),
+            curve,
+            render: material.render,
+            curve_is_open: is_open,
+            database: database.path().display().to_string(),
+        })
+    }
+}
