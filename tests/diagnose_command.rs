@@ -40,7 +40,7 @@ name = \"<b>skin</b>\"
 material = \"mannequin-paint\"
 ";
 
-const FILES: [&str; 17] = [
+const FILES: [&str; 18] = [
     "after.toml",
     "error.png",
     "error.svg",
@@ -58,6 +58,7 @@ const FILES: [&str; 17] = [
     "residual-trends.png",
     "residual-trends.svg",
     "residuals.csv",
+    "view.html",
 ];
 
 /// A folder with the scene and a cloud that was rendered from it with so many looks of speckle.

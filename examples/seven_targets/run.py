@@ -51,7 +51,7 @@ def read_cloud(path):
     with open(path, "rb") as file:
         content = file.read()
     header, _, body = content.partition(b"end_header\n")
-    kinds = {"double": "<f8", "float": "<f4", "int": "<i4"}
+    kinds = {"double": "<f8", "float": "<f4", "int": "<i4", "uchar": "u1"}
     words = [line.split() for line in header.decode().splitlines()]
     columns = [(w[2], kinds[w[1]]) for w in words if w[0] == "property"]
     count = next(int(w[2]) for w in words if w[:2] == ["element", "vertex"])

@@ -115,6 +115,7 @@ pub fn read_cloud(path: &Path) -> BTreeMap<String, Vec<f64>> {
             "double" => 8,
             "float" | "uint" | "int" => 4,
             "ushort" => 2,
+            "uchar" => 1,
             other => panic!("unexpected type {other}"),
         };
         let field = &bytes[at..at + width];
@@ -124,6 +125,7 @@ pub fn read_cloud(path: &Path) -> BTreeMap<String, Vec<f64>> {
             "float" => f32::from_le_bytes(field.try_into().unwrap()).into(),
             "uint" => u32::from_le_bytes(field.try_into().unwrap()).into(),
             "int" => i32::from_le_bytes(field.try_into().unwrap()).into(),
+            "uchar" => field[0].into(),
             _ => u16::from_le_bytes(field.try_into().unwrap()).into(),
         }
     };
