@@ -322,6 +322,7 @@ def diagnose(
     scene: Scene | _Name,
     *,
     db: Database | None = None,
+    effects: Sequence[str] = ...,
     seed: int = 0,
     controls: bool = True,
 ) -> Diagnosis: ...

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use matdb::adopt::{CheckedRequest, CloudRequest, Earlier, Publication, input};
 use matdb::diagnose::Report;
+use matdb::effects::{Effect, find};
 use matdb::error::Error;
 use matdb::files::{folder_of, write_all};
 use matdb::scene::read_text;
@@ -14,7 +15,7 @@ use serde_json::{Value, json};
 
 use crate::cloud::CloudLike;
 use crate::database::Database;
-use crate::error::raised;
+use crate::error::{UsageError, raised};
 use crate::interrupt::interruptible;
 use crate::json::to_python;
 use crate::scene::{Scene, SceneLike};
@@ -24,6 +25,8 @@ struct Subject {
     cloud: CloudLike,
     scene: Py<Scene>,
     database: Option<setup::Database>,
+    /// Those to try; all where there are none.
+    effects: Vec<&'static dyn Effect>,
     seed: u64,
     controls: bool,
 }
@@ -46,6 +49,8 @@ pub(crate) struct Diagnosis {
 ///     The scene that was measured.
 /// db : Database, optional
 ///     Where materials are looked for; without it, and for those that it does not have, the built-in ones.
+/// effects : list of str, optional
+///     Names of the effects to try; all unless stated.
 /// seed : int, default 0
 /// controls : bool, default True
 ///     Whether controls are computed, which take as long as the diagnosis.
@@ -59,17 +64,23 @@ pub(crate) struct Diagnosis {
 /// matdb.Error
 ///     Too few data, or data that are not of this scene.
 #[pyfunction]
-#[pyo3(signature = (cloud, scene, *, db = None, seed = 0, controls = true))]
+#[pyo3(signature = (cloud, scene, *, db = None, effects = Vec::new(), seed = 0, controls = true))]
 pub(crate) fn diagnose(
     py: Python<'_>,
     cloud: CloudLike,
     scene: SceneLike,
     db: Option<&Database>,
+    effects: Vec<String>,
     seed: u64,
     controls: bool,
 ) -> PyResult<Diagnosis> {
     let (scene, database) = (scene.scene(py)?, db.map(Database::database));
-    let subject = Subject { cloud, scene, database, seed, controls };
+    let effects = effects.iter().map(|name| {
+        let unknown = || UsageError::new_err(format!("there is no effect `{name}` of clouds"));
+        find(name).ok_or_else(unknown)
+    });
+    let effects = effects.collect::<PyResult<Vec<_>>>()?;
+    let subject = Subject { cloud, scene, database, effects, seed, controls };
     let answer = interruptible(py, |stop| {
         subject.check(Path::new("."), |checked| {
             let clouds = checked.read_clouds(|_, _| subject.cloud.read())?;
@@ -97,7 +108,7 @@ impl Subject {
             scene: scene.path(),
             further: &[],
             receiver: None,
-            effects: &[],
+            effects: &self.effects,
             material: None,
             seed: self.seed,
             controls: self.controls,

@@ -222,12 +222,13 @@ def test_a_diagnosis_is_that_of_the_command_line(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     md.render(md.load_scene("builtin:concealed")).save("out")
     Path("bench.toml").write_text(md.load_scene("builtin:bench").text)
-    why = md.diagnose("out/cloud.ply", "bench.toml", controls=False)
+    why = md.diagnose("out/cloud.ply", "bench.toml", effects=["drift", "foreign-patch"], controls=False)
     assert why.verdict == "explained" and [effect["name"] for effect in why.effects] == ["foreign-patch"]
     assert why.after["rmse_db"] < why.before["rmse_db"]
     assert repr(why) == "<matdb.Diagnosis: explained foreign-patch>"
     why.save("why")
-    words = ["diagnose", "out/cloud.ply", "--scene", "bench.toml", "-o", "by-command", "--no-controls", "--json", "-q"]
+    words = ["diagnose", "out/cloud.ply", "--scene", "bench.toml", "-o", "by-command", "--no-controls", "--json", "-q",
+             "--effects", "drift,foreign-patch"]
     done = command(tmp_path, *words)
     assert json.loads(done.stdout) == why.to_dict()
     of_words = ["report.html", "after.toml"]  # these name the folder
@@ -239,12 +240,15 @@ def test_a_diagnosis_is_that_of_the_command_line(tmp_path, monkeypatch):
     scan = md.render(md.load_scene("builtin:concealed"))
     arrays = md.Cloud(scan.xyz_m, scan.points_dbm, chirp=scan.cloud["chirp"], range_m=scan.cloud["range_m"])
     assert len(points) == len(arrays) and np.allclose(points.xyz_m, arrays.xyz_m, atol=1e-6)
-    again = md.diagnose(arrays, md.load_scene("builtin:bench").replace(name="Bench of arrays"), controls=False)
+    again = md.diagnose(arrays, md.load_scene("builtin:bench").replace(name="Bench of arrays"), effects=["foreign-patch"],
+                        controls=False)
     assert [effect["name"] for effect in again.effects] == ["foreign-patch"]
     again.report("pages/of arrays.html")
     assert "Bench of arrays" in Path("pages/of arrays.html").read_text() and len(files("pages")) == 1
     with pytest.raises(md.Error, match="nothing.ply"):
         md.diagnose("nothing.ply", "bench.toml")
+    with pytest.raises(md.UsageError, match="there is no effect `patch`"):
+        md.diagnose("out/cloud.ply", "bench.toml", effects=["patch"])
     with pytest.raises(ValueError, match="give \\(n, 3\\)"):
         md.Cloud([[0, 0, 1]], [-40, -50])
     with pytest.raises(md.Error, match="the cloud has no points"):

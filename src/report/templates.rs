@@ -13,7 +13,7 @@ const PAGES: [(&str, &str); 7] = [
     ("cloud.html", include_str!("templates/cloud.html")),
     ("curve.html", include_str!("templates/curve.html")),
     ("cannot_tell.html", include_str!("templates/cannot_tell.html")),
-    ("viewer.html", include_str!("templates/viewer.html")),
+    ("view.html", include_str!("templates/view.html")),
 ];
 
 /// The bytes of a page of this context.

@@ -30,6 +30,16 @@ pub struct Browser {
 impl Browser {
     /// A browser whose downloads go into a folder; `None`, with a word about it, where there is none.
     pub fn start(downloads: &Path) -> Option<Browser> {
+        Browser::drawing(downloads, &["--disable-gpu"])
+    }
+
+    /// As [`Browser::start`], of one that draws in three dimensions, in software.
+    pub fn in_three_dimensions(downloads: &Path) -> Option<Browser> {
+        let flags = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
+        Browser::drawing(downloads, &flags)
+    }
+
+    fn drawing(downloads: &Path, drawing: &[&str]) -> Option<Browser> {
         let driver = Command::new("chromedriver")
             .arg("--port=0")
             .stdout(Stdio::piped())
@@ -51,7 +61,7 @@ impl Browser {
         let port = port_of(&mut driver);
         let profile = tempfile::tempdir().unwrap();
         let mut browser = Browser { driver, port, session: String::new(), _profile: profile };
-        let capabilities = capabilities(browser._profile.path(), downloads);
+        let capabilities = capabilities(browser._profile.path(), downloads, drawing);
         let answer = browser.call("POST", "/session", &capabilities);
         browser.session = answer["sessionId"].as_str().expect("a session").to_owned();
         Some(browser)
@@ -200,14 +210,10 @@ fn port_of(driver: &mut Child) -> u16 {
     lines.map_while(Result::ok).find_map(port).expect("the driver names its port")
 }
 
-fn capabilities(profile: &Path, downloads: &Path) -> Value {
+fn capabilities(profile: &Path, downloads: &Path, drawing: &[&str]) -> Value {
     let arguments = [
         "--headless=new",
         "--no-sandbox",
-        // Drawings in three dimensions, in software.
-        "--use-gl=angle",
-        "--use-angle=swiftshader",
-        "--enable-unsafe-swiftshader",
         "--disable-quic",
         "--no-first-run",
         "--disable-background-networking",
@@ -217,7 +223,8 @@ fn capabilities(profile: &Path, downloads: &Path) -> Value {
         // What scrolls slowly is not where a click expects it.
         "--force-prefers-reduced-motion",
     ];
-    let mut arguments: Vec<String> = arguments.iter().map(|a| (*a).to_owned()).collect();
+    let mut arguments: Vec<String> =
+        arguments.iter().chain(drawing).map(|a| (*a).to_owned()).collect();
     arguments.push(format!("--user-data-dir={}", profile.display()));
     json!({ "capabilities": { "alwaysMatch": {
         "browserName": "chrome",

@@ -194,6 +194,6 @@ impl ViewPage<'_> {
             data: String,
         }
         let data = serde_json::to_string(self)?;
-        templates::page("viewer.html", &Context { title: self.title, data })
+        templates::page("view.html", &Context { title: self.title, data })
     }
 }
