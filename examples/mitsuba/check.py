@@ -250,8 +250,8 @@ def strengths():
         found = effects.calibrate(lambda: untouched(name), "angle-error", "weak", 1, 4)
         truth = {"detections": int(use.sum()), "false_alarms": 0, "labels": ["angle-error"], "looks": 4, "declared_looks": 4,
                  "independent_share": 1.0, "tilt_spread_db": generate.tilt_spread_db(before, found.size, use)}
-        gain = score.expected_gain(truth)["angle-error"]
-        say(f"{name}: gain in ln p that counts as in the data, over that of a weak angle-error, {gain:.1f}", score.IN_THE_DATA / gain, 1)
+        gain = score.held_out("angle-error", score.expected_gain(truth)["angle-error"])
+        say(f"{name}: gain in held-out ln p that counts as in the data, over that of a weak angle-error, {gain:.1f}", score.IN_THE_DATA / gain, 1)
         for strength, loss in effects.OWN_DB["compression"].items():
             s = untouched(name)
             effects.compression(s, effects.calibrate(lambda: untouched(name), "compression", strength, 1, 4).size, None)
@@ -327,6 +327,70 @@ def gains():
             size = {"compression": 1e-9, "speckle": 4.0}.get(label, 0.0)
             out = realised("groove", label, effects.Sized(size, 0.0, 0.0, law_mw), 1)[0]
             say(f"groove: realised gain of {label} of size 0", abs(out[0]), 0.01)
+
+
+def costs():
+    """What learning the numbers of a form costs in held-out ln p, by linear forms of ln mean and by effects near the limit."""
+    rng, chirps, draws, looks, law, form = np.random.default_rng(6), 1000, 1000, 4, 4, 6
+    x = rng.normal(size=(chirps, law + form))
+    ln_mean = x @ np.repeat([0.0, 0.03], (law, form))
+    echo, fold = np.exp(ln_mean) * rng.gamma(looks, 1 / looks, (draws, chirps)), np.arange(chirps) % score.FOLDS
+
+    def fit(x, echo):  # by scores: the information on ln mean is the same everywhere
+        found, step = np.zeros((len(echo), x.shape[1])), np.linalg.pinv(x).T
+        for _ in range(8):
+            found += (echo * np.exp(-found @ x.T) - 1) @ step
+        return found
+
+    def ln_p(echo, ln_mean):
+        return -looks * np.sum(ln_mean + echo * np.exp(-ln_mean), 1)
+
+    def held(out, count):
+        return ln_p(echo[:, out], fit(x[~out, :count], echo[:, ~out]) @ x[out, :count].T)
+
+    refitted = fit(x[:, :law], np.exp(ln_mean)[None]) @ x[:, :law].T
+    realised = ln_p(echo, ln_mean) - ln_p(echo, refitted)
+    lost = (realised - sum(held(fold == k, law + form) - held(fold == k, law) for k in range(score.FOLDS))) / form
+    say(f"held-out gain below the realised one, {realised.mean():.1f}, by {lost.mean():.3f} a number against {score.COST}, "
+        "standard errors off", abs(lost.mean() - score.COST) / (np.std(lost) / draws**0.5), 3)
+    for name in ("groove", "sphere"):
+        for label in ("drift", "fov-gain", "covering-layer"):
+            found = effects.calibrate(lambda: untouched(name), label, "weak", 0, 4)
+            best, gain = simplest(name, label, found), NEAR * found.gain
+            say(f"{name}: weak {label} of gain {gain:.1f}, of which the best simple form keeps {best:.1f} in held-out ln p, "
+                "what is counted off", abs(best - score.held_out(label, gain)), 1)
+
+
+NEAR = 0.18  # share of independent chirps with which weak effects gain 5 to 10
+
+
+def simplest(name, label, found):
+    """Held-out gain of the best form with few numbers: a polynomial, a field about the middle, a circle of even thickness."""
+    before, after = untouched(name), untouched(name)
+    effects.EFFECTS[label](after, found.size, np.random.default_rng(0))
+    law, true, use = refit.Law(before), after.means_mw()[0], audible(before)
+
+    def lost(*gains):
+        return law.fit(true, use, gains).loss(4)
+
+    if label == "drift":
+        column = [np.polynomial.Legendre.basis(n)(2 * before.share - 1) for n in range(1, 9)]
+        forms = [(n, lost(*column[:n])) for n in range(1, 9)]
+    elif label == "fov-gain":
+        x, y = before.aim.T / [[0.25], [0.45]]
+        forms = [(1, lost(np.hypot(x, y) ** 2.15 + 0.2 * x))]
+    else:
+        change = np.abs(np.log(true / law.power_mw, where=use, out=np.zeros_like(true)))
+        inside = before.surface[change > 0.3 * change.max()]
+
+        def circle(at):
+            d = np.hypot(*(before.surface - at[:2]).T)
+            return lost(1 / np.cos(before.theta()) / (1 + np.exp((d - at[2]) / 0.003)))
+
+        start = np.array([*inside.mean(0), np.sqrt(2 * inside.var(0).sum())])
+        simplex = start + 0.02 * np.eye(4, 3, -1)
+        forms = [(4, minimize(circle, start, method="Nelder-Mead", options={"maxfev": 60, "initial_simplex": simplex}).fun)]
+    return max(NEAR * (found.gain - left) - score.COST * count for count, left in forms)
 
 
 def laws():
@@ -449,6 +513,7 @@ if __name__ == "__main__":
     shapes()
     strengths()
     gains()
+    costs()
     laws()
     refits()
     spots()

@@ -279,6 +279,30 @@ EFFECTS = {
     **{kind: functools.partial(unknown, kind=kind) for kind in UNKNOWN},
 }
 KNOWN = [n for n in EFFECTS if n not in UNKNOWN]
+# Numbers that are learned from data by one who knows the form and the law: what is drawn, and the size. Constants of a form
+# and its sign are no such numbers, nor is what the law's own level takes.
+LEARNED = {
+    "angle-error": 1,  # sd; the tilts are noise
+    "anisotropy": 3,  # ratio, direction, sway
+    "compression": 1,  # ceiling
+    "correlated-shadowing": 1,  # power
+    "covering-layer": 16,  # two of each of six corners (five to seven are drawn); loss; slopes in x and y of a wave, its phase
+    "drift": 3,  # six, height and time of the warm-up and four of the knots; but a bend or two are all that pays near the limit
+    "finite-spot": 3,  # width, what it is longer by, direction
+    "foreign-patch": 6,  # centre (2), radius, phases of two waves, level, from which its lobe follows
+    "fov-gain": 3,  # four, centre (2), power, size; but centre and power hardly pay near the limit
+    "motion": 42,  # seven knots in six degrees of freedom
+    "multi-bounce": 1,  # size; the flanks are known
+    "noise-floor": 2,  # level, which the realised gain has fitted to the same alarms already
+    "pose": 6,  # shift, turn
+    "speckle": 1,  # looks
+    "subsurface": 1,  # level
+    "thin-film": 5,  # thickness, index, size, slopes in x and y of a wave
+    "spiral": 4,  # centre (2), pitch, size
+    "stripes": 2,  # width, size
+    "sawtooth": 2,  # period, size
+    "checkers": 1,  # size
+}
 # Sizes below and beyond which an effect would not be itself: a spot of less than 1 mm changes a few chirps at edges.
 START = {"finite-spot": 0.1}
 LIMIT = {"finite-spot": 3.2, "thin-film": 1.0, "correlated-shadowing": 1.0}

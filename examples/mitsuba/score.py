@@ -9,10 +9,14 @@ import math
 import os
 
 import diagnoses
+import effects
 from intervals import intervals
 
 
-IN_THE_DATA = 5.0  # realised gain in ln p below which not even the true form can be seen
+IN_THE_DATA = 5.0  # gain in held-out ln p below which not even the true form can be seen
+FOLDS = 5
+COST = FOLDS / (2 * (FOLDS - 1))  # in held-out ln p, of a number that is learned from the other folds
+PAYS = 2  # times its cost is what a number gains, in the mean over those that are learned
 LEFT_DB = {"strong": 1.33, "moderate": 0.665, "weak": 0.33}
 
 
@@ -53,6 +57,19 @@ def expected_gain(truth):
     return out
 
 
+def held_out(effect, gain):
+    """What a form of this gain, with its numbers known, gains in held-out ln p where they are learned from the other folds.
+
+    A form is made simpler until its numbers pay."""
+    return gain - min(COST * effects.LEARNED[effect], max(gain, 0) / PAYS)
+
+
+def held_out_gain(truth):
+    """The same of each effect of a case, from its realised gain."""
+    return {label: held_out(truth["kind"] if label == "unknown" else label, gain)
+            for label, gain in truth["realised_gain"].items()}
+
+
 def judge(answer, truth):
     """What kind of case it is, whether the answer is right, and the names that were said."""
     said = [e["name"] for e in answer.get("effects", [])]
@@ -68,7 +85,7 @@ def judge(answer, truth):
         if not truth["reaches_strength"]:
             left = truth["left_after_refit_db"][labels[0]]
             kind = next((k for k in list(LEFT_DB)[list(LEFT_DB).index(kind):] if left >= LEFT_DB[k]), "below weak")
-    return "not in the data" if min(truth["realised_gain"].values()) < IN_THE_DATA else kind, good, said
+    return "not in the data" if min(held_out_gain(truth).values()) < IN_THE_DATA else kind, good, said
 
 
 def outcome(case, truth, answer):
@@ -138,7 +155,7 @@ class Score:
         for line in self.misses:
             print(" ", line)
         if self.apart:
-            print(f"not in the data (on these very data the true form itself gains less than {IN_THE_DATA:g} in ln p):")
+            print(f"not in the data (on these very data the true form itself gains less than {IN_THE_DATA:g} in held-out ln p):")
             for line in self.apart:
                 print(" ", line)
 
@@ -146,12 +163,13 @@ class Score:
 def in_words(case, truth, answer, said):
     left = ", ".join(f"{u.get('covariate')} {u.get('strength_db') or 0:.2f} dB" for u in answer.get("unexplained", []))
     words = "" if said or left else f" [{answer.get('reason') or answer['words'][-200:]}]"
-    expected = expected_gain(truth)
-    gain = ", ".join(f"{v:.1f} for {g}, expected {expected[g]:.1f}" for g, v in truth["realised_gain"].items()) or "none"
+    expected, held = expected_gain(truth), held_out_gain(truth)
+    gain = ", ".join(f"for {g} expected {expected[g]:.1f}, realised {v:.1f}, held out {held[g]:.1f}"
+                     for g, v in truth["realised_gain"].items()) or "none"
     if set(truth["labels"]) & {"finite-spot", "multi-bounce"}:
         gain += f", by ranges {truth['range_gain']:.0f} more"
     return (f"{case} {truth['base']} {'+'.join(truth['labels']) or 'none'} ({truth['strength']}, {truth.get('kind')}, "
-            f"{truth['speckle']}, level {truth['level_offset_db']:+.1f} dB; realised gain {gain}): "
+            f"{truth['speckle']}, level {truth['level_offset_db']:+.1f} dB; gain {gain}): "
             f"{answer['verdict']}, said {'+'.join(said) or 'nothing'}; left: {left or 'nothing'}{words}")
 
 
