@@ -251,7 +251,8 @@ def strengths():
         truth = {"detections": int(use.sum()), "false_alarms": 0, "labels": ["angle-error"], "looks": 4, "declared_looks": 4,
                  "independent_share": 1.0, "tilt_spread_db": generate.tilt_spread_db(before, found.size, use)}
         gain = score.held_out("angle-error", score.expected_gain(truth)["angle-error"])
-        say(f"{name}: gain in held-out ln p that counts as in the data, over that of a weak angle-error, {gain:.1f}", score.IN_THE_DATA / gain, 1)
+        say(f"{name}: gain in held-out ln p that counts as in the data, over that of a weak angle-error, {gain:.1f}",
+            score.IN_THE_DATA / gain, 1)
         for strength, loss in effects.OWN_DB["compression"].items():
             s = untouched(name)
             effects.compression(s, effects.calibrate(lambda: untouched(name), "compression", strength, 1, 4).size, None)
@@ -380,7 +381,7 @@ def simplest(name, label, found):
         x, y = before.aim.T / [[0.25], [0.45]]
         forms = [(1, lost(np.hypot(x, y) ** 2.15 + 0.2 * x))]
     else:
-        change = np.abs(np.log(true / law.power_mw, where=use, out=np.zeros_like(true)))
+        change = np.abs(np.log(np.where(use, true, 1) / np.where(use, law.power_mw, 1)))
         inside = before.surface[change > 0.3 * change.max()]
 
         def circle(at):

@@ -287,10 +287,10 @@ LEARNED = {
     "compression": 1,  # ceiling
     "correlated-shadowing": 1,  # power
     "covering-layer": 16,  # two of each of six corners (five to seven are drawn); loss; slopes in x and y of a wave, its phase
-    "drift": 3,  # six, height and time of the warm-up and four of the knots; but a bend or two are all that pays near the limit
+    "drift": 3,  # of six (height and time of the warm-up, four knots): no more pay near the limit
     "finite-spot": 3,  # width, what it is longer by, direction
     "foreign-patch": 6,  # centre (2), radius, phases of two waves, level, from which its lobe follows
-    "fov-gain": 3,  # four, centre (2), power, size; but centre and power hardly pay near the limit
+    "fov-gain": 3,  # of four (centre (2), power, size): no more pay near the limit
     "motion": 42,  # seven knots in six degrees of freedom
     "multi-bounce": 1,  # size; the flanks are known
     "noise-floor": 2,  # level, which the realised gain has fitted to the same alarms already

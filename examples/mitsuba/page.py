@@ -49,8 +49,8 @@ def page(rows, scores, done, made_by):
         "*Right name first*: the first effect of the report is the true one. *Both of a pair*: the first two are the two. "
         "*Unknown*: the verdict is `unexplained` and nothing is named. *False alarm*: any name, and any verdict but "
         "`no-missing-effect`, where nothing is missing. *Not in the data*: the true form itself gains less than "
-        f"{score.IN_THE_DATA:g} in held-out ln p on the observations of the case. *Below weak*: the effect cannot be had weak on that "
-        "target.\n",
+        f"{score.IN_THE_DATA:g} in held-out ln p on the observations of the case. *Below weak*: the effect cannot be had weak "
+        "on that target.\n",
         "## What each effect was called\n",
         "Names that were said in one case are joined by `+`; where none was, the verdict stands.\n",
         table(("true effect", *STRENGTHS), called(scores)),

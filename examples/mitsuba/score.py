@@ -155,7 +155,7 @@ class Score:
         for line in self.misses:
             print(" ", line)
         if self.apart:
-            print(f"not in the data (on these very data the true form itself gains less than {IN_THE_DATA:g} in held-out ln p):")
+            print(f"not in the data (on these data the true form itself gains less than {IN_THE_DATA:g} in held-out ln p):")
             for line in self.apart:
                 print(" ", line)
 
