@@ -20,6 +20,9 @@ use crate::interrupt::interruptible;
 use crate::json::to_python;
 use crate::scene::{Scene, SceneLike};
 
+/// Name and bytes of a file.
+type File = (String, Vec<u8>);
+
 /// What was diagnosed: a cloud and the scene that was measured.
 struct Subject {
     cloud: CloudLike,
@@ -140,7 +143,7 @@ fn publication<Done>(
 
 impl Diagnosis {
     /// The files of its report, for a folder, and what an earlier one left there.
-    fn files(&self, folder: &Path) -> Result<(Vec<(String, Vec<u8>)>, Earlier), Error> {
+    fn files(&self, folder: &Path) -> Result<(Vec<File>, Earlier), Error> {
         self.subject.check(folder, |checked| {
             publication(checked, &self.found, &checked.notices(), |publication| {
                 let earlier = Earlier::in_folder(folder, &checked.request.inputs());

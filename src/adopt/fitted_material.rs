@@ -50,9 +50,11 @@ impl FittedMaterial<'_> {
         let details = Details { curve: Some(subject.curve_name.clone()), ..details };
         let (mut material, _) =
             Foreign::Csv.read(&subject.label, &subject.curve.write(), &details)?;
-        let [curve] = &material.curves[..] else {
+        let [curve] = &mut material.curves[..] else {
             return Err(Error::usage("the curve has no point", "measure again"));
         };
+        // A file has fewer digits, and the fit is of these.
+        curve.observations.clone_from(&subject.curve.observations);
         let (curve, source) = (curve.name.clone(), curve.source.clone());
         let is_open = render_fit(&mut material, result, fit_name, [&curve, &source], false);
         admission::check(&material, Path::new(&subject.label))?;
