@@ -55,7 +55,8 @@ impl Database {
         material_class: &str,
         description: Option<String>,
     ) -> PyResult<Vec<String>> {
-        let slug: Slug = name.parse().map_err(|error| UsageError::new_err(error.to_string()))?;
+        let slug = name.parse::<Slug>();
+        let slug = slug.map_err(|error| UsageError::new_err(error.to_string()))?;
         let stored = py.detach(|| {
             let CurveOrigin { kind, title, licence, instrument, frequency_hz, threshold_w } =
                 origin.clone();
