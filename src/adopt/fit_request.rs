@@ -273,14 +273,19 @@ impl CheckedFit {
                 Err(error) => refusal = Some(error),
             }
         } else if storage.is_some() {
-            refusal = Some(Error::usage(
-                format!("{}: nothing is stored, since the fit is out of range", subject.label),
-                "the verdict says what to let go of",
-            ));
+            refusal = Some(out_of_range(&subject));
         }
         let fit = result.stored(&fit_name, &subject.curve_name, "");
         Ok(FitOutcome { subject, result, fit, stored, refusal })
     }
+}
+
+/// The refusal to store a law that no material can have.
+pub(super) fn out_of_range(subject: &FitSubject) -> Error {
+    Error::usage(
+        format!("{}: nothing is stored, since the fit is out of range", subject.label),
+        "the verdict says what to let go of",
+    )
 }
 
 fn is_held(path: &str, held: &[(String, f64)]) -> bool {

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::admission;
+use super::fit_request::out_of_range;
 use super::fit_storage::{FitStorage, StoredFit, render_fit};
 use super::fit_subject::FitSubject;
 use crate::catalogue::exchange::{Details, Foreign};
@@ -30,13 +31,16 @@ impl FittedMaterial<'_> {
     /// Stores the fit as a new revision of the material, or makes the material with curve and fit.
     ///
     /// # Errors
-    /// Details that a new material lacks; what [`FitStorage`] refuses of one that is there; a fit that did not converge;
-    /// a database that cannot be written.
+    /// Details that a new material lacks; what [`FitStorage`] refuses of one that is there; a fit that did not converge
+    /// or is out of range; a database that cannot be written.
     pub fn store(self, database: &Database) -> Result<StoredFit, Error> {
         let FittedMaterial { subject, result, fit_name, details, storage } = self;
-        if !result.converged || result.model.validate().is_err() {
+        if !result.converged {
             let curve = subject.label.clone();
             return Err(Error::NotConverged { curve, stop: result.stop.as_str() });
+        }
+        if result.model.validate().is_err() {
+            return Err(out_of_range(subject));
         }
         let name = details.slug.as_ref().map(ToString::to_string).unwrap_or_default();
         // The first material makes the file.

@@ -4,7 +4,7 @@ mod answer;
 mod bars;
 mod maps;
 mod models;
-pub(super) mod outline;
+mod outline;
 mod page;
 mod pictures;
 mod places;
@@ -29,6 +29,7 @@ use crate::error::Error;
 use places::Peak;
 
 pub use answer::{CloudAnswer, NextSteps};
+pub(super) use outline::Outline;
 pub use record::CloudRecord;
 
 /// A report on a cloud with its pictures drawn.

@@ -22,7 +22,9 @@ impl Outline {
         match found.place? {
             Place::Beyond { off_m, direction_deg } => Some(Outline::Line { off_m, direction_deg }),
             Place::Round { x_m, y_m, radius_m } => {
-                let nearest = nearest(rows, x_m, y_m)?;
+                let nearest = rows
+                    .iter()
+                    .min_by(|a, b| distance_m(a, x_m, y_m).total_cmp(&distance_m(b, x_m, y_m)))?;
                 // The radius is one on the surface.
                 let radius_m = radius_m * plane_m / nearest.range_m;
                 Some(Outline::Ring { x_m, y_m, radius_m })
@@ -105,13 +107,8 @@ impl Outline {
     }
 }
 
-/// The shot that is nearest to a place in the target plane.
-pub(in crate::report) fn nearest(rows: &[Row], x_m: f64, y_m: f64) -> Option<&Row> {
-    rows.iter().min_by(|a, b| distance_m(a, x_m, y_m).total_cmp(&distance_m(b, x_m, y_m)))
-}
-
 /// Distance of a shot from a place in the target plane, m.
-pub(in crate::report) fn distance_m(row: &Row, x_m: f64, y_m: f64) -> f64 {
+fn distance_m(row: &Row, x_m: f64, y_m: f64) -> f64 {
     (row.xt_m - x_m).hypot(row.yt_m - y_m)
 }
 

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
-use super::page::{Instrument, Numbers, Plane, PowerImage};
+use super::page::{Instrument, Numbers, PowerImage};
 use crate::error::Error;
 use crate::formats::base64::base64;
 use crate::formats::figure::{Figure, Scale};
@@ -33,11 +33,11 @@ pub(super) fn instrument(scene: &Scene) -> Instrument {
     }
 }
 
-/// A power image in the target plane of a scene.
+/// A power image in the target plane.
 ///
 /// # Errors
 /// A raster without power.
-pub(super) fn power_image(scene: &Scene, image: &Raster) -> Result<PowerImage, Error> {
+pub(super) fn power_image(image: &Raster) -> Result<PowerImage, Error> {
     let figure = Figure {
         raster: image,
         channel: "power_dbm",
@@ -50,20 +50,12 @@ pub(super) fn power_image(scene: &Scene, image: &Raster) -> Result<PowerImage, E
         x_label: "",
         y_label: "",
     };
-    let global_from_target = scene.radar().frames().global_from_target;
-    let [origin, x, y] =
-        [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].map(|(x, y)| in_plane(&global_from_target, x, y));
     Ok(PowerImage {
         png: base64(&figure.pixels()?),
         rows: image.height,
         columns: image.width,
         from_m: [image.x_m(0), image.y_m(0)],
         step_m: [image.pixel_m, -image.pixel_m],
-        frame: Plane {
-            origin_m: origin.to_array(),
-            x: (x - origin).to_array(),
-            y: (y - origin).to_array(),
-        },
         x_column: "xt_m",
         y_column: "yt_m",
     })

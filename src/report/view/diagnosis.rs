@@ -9,7 +9,8 @@ use super::page::{Curve, Kind, Numbers, Outlines, Points, Surface, Values, ViewP
 use crate::diagnose::{Report, Row};
 use crate::error::Error;
 use crate::frames::{Global, Ray};
-use crate::report::cloud::outline::{Outline, distance_m, nearest};
+use crate::measure::nearest::Nearest;
+use crate::report::cloud::Outline;
 use crate::scene::Scene;
 use crate::units::{db_from_ratio, dbm_from_watts};
 
@@ -23,7 +24,7 @@ struct Detection<'a> {
 /// A page of a diagnosis. Of several clouds it shows the first, which is that of the scene.
 ///
 /// # Errors
-/// Never, for a report of this scene.
+/// A number that JSON does not have.
 pub(in crate::report) fn diagnosis_page(scene: &Scene, report: &Report) -> Result<Vec<u8>, Error> {
     let ray_of: HashMap<u32, &Ray<Global>> =
         scene.chirps.number.iter().copied().zip(&scene.chirps.rays).collect();
@@ -83,34 +84,31 @@ fn columns(scene: &Scene, detections: &[Detection]) -> Vec<Values> {
 }
 
 /// Where effects act in one part of the target: their outlines, moved from the target plane along the beam to the range of
-/// the nearest chirp.
+/// the nearest chirp that meets the target.
 fn outlines(scene: &Scene, report: &Report) -> Vec<Outlines> {
+    /// An outline ends where no chirp meets the target within this.
+    const NEAR_M: f64 = 0.05;
     let frames = scene.radar().frames();
     let origin = frames.origin().xyz;
+    let aims: Vec<DVec3> =
+        report.rows.iter().map(|row| DVec3::new(row.xt_m, row.yt_m, 0.0)).collect();
+    let Some(aims) = Nearest::new(&aims) else { return Vec::new() };
     let mut found = Vec::new();
     for effect in &report.effects {
         let outline = Outline::new(effect, &report.rows, frames.pattern_range_m);
         let Some(outline) = outline else { continue };
         let places = outline.points_m().into_iter().filter_map(|[x_m, y_m]| {
-            let range_m = range_m_at(&report.rows, x_m, y_m)?;
+            let (row, away_m) = aims.find(DVec3::new(x_m, y_m, 0.0));
             let towards = in_plane(&frames.global_from_target, x_m, y_m) - origin;
-            Some(origin + range_m * towards.normalize())
+            (away_m < NEAR_M).then(|| origin + report.rows[row].range_m * towards.normalize())
         });
         let places: Vec<DVec3> = places.collect();
         if places.len() > 1 {
             found.push(Outlines {
                 label: format!("{}: {}", effect.name, outline.name()),
                 lines_m: Numbers::places(places.into_iter()),
-                closed: false,
             });
         }
     }
     found
-}
-
-/// Range of the mesh next to a place in the target plane, m; none where no chirp meets it near there.
-fn range_m_at(rows: &[Row], x_m: f64, y_m: f64) -> Option<f64> {
-    const NEAR_M: f64 = 0.05;
-    let nearest = nearest(rows, x_m, y_m)?;
-    (distance_m(nearest, x_m, y_m) < NEAR_M).then_some(nearest.range_m)
 }

@@ -79,17 +79,8 @@ pub(in crate::report) struct PowerImage {
     /// Centre of the first pixel, m.
     pub from_m: [f64; 2],
     pub step_m: [f64; 2],
-    pub frame: Plane,
     pub x_column: &'static str,
     pub y_column: &'static str,
-}
-
-/// A plane in the global frame.
-#[derive(Serialize)]
-pub(in crate::report) struct Plane {
-    pub origin_m: [f64; 3],
-    pub x: [f64; 3],
-    pub y: [f64; 3],
 }
 
 /// Where an effect that was found acts.
@@ -97,7 +88,6 @@ pub(in crate::report) struct Plane {
 pub(in crate::report) struct Outlines {
     pub label: String,
     pub lines_m: Numbers,
-    pub closed: bool,
 }
 
 /// Two columns that are drawn as a curve.

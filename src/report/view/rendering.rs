@@ -30,7 +30,7 @@ pub fn rendering_page(
         points: points(cloud, &[("region", &regions), ("material", materials)]),
         mesh: Surface::of(&scene.target.mesh),
         radar: Some(instrument(scene)),
-        image: Some(power_image(scene, image)?),
+        image: Some(power_image(image)?),
         shapes: Vec::new(),
         curve: Some(Curve { x: "incidence_deg", y: "power_dbm" }),
     };
