@@ -7,6 +7,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::alarms::{Alarms, MOST_OVER_THRESHOLD, odds};
+use super::beside::{Beside, GATE_M, SHELLS_M, lengths_near_m, reach};
 use super::error::DiagnoseError;
 use super::observation::{NO_LIMIT_W, Observation};
 use crate::effects::{Antenna, BeamSpot, Model, Shot, Stage};
@@ -18,8 +19,6 @@ use crate::radar::{Chirps, Returns};
 
 /// Share of a cloud off the target from which it is a cloud of another target.
 pub(super) const MOST_STRAYS: f64 = 0.25;
-/// Largest distance of a detection from where its chirp meets the target, m.
-const GATE_M: f64 = 0.1;
 /// Largest distance of a detection from its chirp's ray, m: less than from one chirp to the next.
 const ON_RAY_M: f64 = 0.01;
 
@@ -59,6 +58,25 @@ pub struct CloudMatch {
     pub alarms: Alarms,
 }
 
+/// What a radar reports.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Reported {
+    /// Up to four times this power a detection without a target may be a false alarm, W.
+    pub threshold_w: f64,
+    /// Which detections of a chirp.
+    pub returns: Returns,
+    /// The antenna of the cloud; none for the radar's own.
+    pub antenna: Option<Antenna>,
+    /// Length of a range cell, and how far a spot spreads in range on a slope of 45°, m, of a radar that reports its strongest
+    /// detection and whose receiver parts second-order paths from the first surface: a detection farther than that by
+    /// more than the two is by such a path, and the first surface then was weaker.
+    pub parted_m: Option<[f64; 2]>,
+    /// Range cells of the gate; none where it is not declared.
+    pub gate_cells: Option<f64>,
+    /// Length of a range cell, m.
+    pub cell_m: f64,
+}
+
 /// Assigns the points of a cloud to the shots of its scan, by chirp numbers or, without them, by directions. The shots of one chirp
 /// follow each other, and a point is of the one to which it is nearest. Of several
 /// detections of a chirp that reports all, the one nearest to the target is its echo. A detection
@@ -74,25 +92,11 @@ pub fn match_cloud(
     cloud: &Cloud,
     chirps: &Chirps,
     shots: &[Shot],
-    threshold_w: f64,
-    returns: Returns,
-    antenna: Option<Antenna>,
+    reported: Reported,
 ) -> Result<CloudMatch, DiagnoseError> {
-    Scan { threshold_w, returns, antenna, ..Scan::new(chirps) }.match_cloud(cloud, shots)
-}
-
-/// As [`match_cloud`], for a radar that reports its strongest detection and whose receiver parts second-order paths from the first
-/// surface: a detection farther than that by more than `parted_m`, m, a range cell and what a spot spreads on a slope of 45°, is by
-/// such a path, and the first surface then was weaker.
-pub(super) fn match_parted(
-    cloud: &Cloud,
-    chirps: &Chirps,
-    shots: &[Shot],
-    threshold_w: f64,
-    parted_m: [f64; 2],
-) -> Result<CloudMatch, DiagnoseError> {
-    let parted_m = Some(parted_m);
-    Scan { threshold_w, parted_m, ..Scan::new(chirps) }.match_cloud(cloud, shots)
+    let index_of_chirp = chirps.number.iter().copied().zip(0..).collect();
+    let directions = Directions::new(chirps);
+    Scan { chirps, index_of_chirp, reported, directions }.match_cloud(cloud, shots)
 }
 
 /// An assignment and its quality.
@@ -126,34 +130,12 @@ impl Assignment {
 struct Scan<'a> {
     chirps: &'a Chirps,
     index_of_chirp: HashMap<u32, usize>,
-    /// Up to so many times this power a detection without a target may be a false alarm, W.
-    threshold_w: f64,
-    /// Which detections of a chirp are reported.
-    returns: Returns,
-    /// The antenna of the cloud; none for the radar's own.
-    antenna: Option<Antenna>,
-    /// Length of a range cell, and how far a spot spreads in range on a slope of 45°, m, where second-order paths part from the first
-    /// surface.
-    parted_m: Option<[f64; 2]>,
+    reported: Reported,
     /// `None` unless all rays start from one point.
     directions: Option<Directions>,
 }
 
 impl Scan<'_> {
-    fn new(chirps: &Chirps) -> Scan<'_> {
-        let index_of_chirp = chirps.number.iter().copied().zip(0..).collect();
-        let directions = Directions::new(chirps);
-        Scan {
-            chirps,
-            index_of_chirp,
-            threshold_w: 0.0,
-            returns: Returns::Strongest,
-            antenna: None,
-            parted_m: None,
-            directions,
-        }
-    }
-
     /// Assigns the points of a cloud to the shots.
     fn match_cloud(&self, cloud: &Cloud, shots: &[Shot]) -> Result<CloudMatch, DiagnoseError> {
         let is_numbered = cloud.points().iter().all(|point| point.chirp.is_some());
@@ -184,7 +166,7 @@ impl Scan<'_> {
 
     /// Whether a point is by way of a second surface, in place of the first one that its shot meets.
     fn is_by_second(&self, point: &CloudPoint, shot: &Shot) -> bool {
-        let Some([cell_m, spot_m]) = self.parted_m else { return false };
+        let Some([cell_m, spot_m]) = self.reported.parted_m else { return false };
         let slope = shot.hit.theta_rad().tan();
         let farther_m = self.range_m(point, shot) - self.expected_m(shot);
         farther_m > cell_m + spot_m * slope && off_ray_m(point, &shot.ray).length() <= ON_RAY_M
@@ -203,7 +185,7 @@ impl Scan<'_> {
     /// Range of a point, m: half of the way to the antenna.
     fn range_m(&self, point: &CloudPoint, shot: &Shot) -> f64 {
         let (radar, there) = (shot.ray.origin, point.point);
-        point.range_m.unwrap_or_else(|| match self.antenna {
+        point.range_m.unwrap_or_else(|| match self.reported.antenna {
             None => radar.distance_m(there),
             Some(antenna) => antenna.half_way_m(radar, there),
         })
@@ -211,7 +193,7 @@ impl Scan<'_> {
 
     /// Range at which a chirp meets the target, m: half of the way to the antenna.
     fn expected_m(&self, shot: &Shot) -> f64 {
-        let way_m = self.antenna.map_or(shot.hit.range_m, |antenna| {
+        let way_m = self.reported.antenna.map_or(shot.hit.range_m, |antenna| {
             antenna.half_way_m(shot.ray.origin, shot.hit.point)
         });
         way_m + shot.longer_m
@@ -281,7 +263,7 @@ impl Scan<'_> {
             let nearest = own.into_iter().flatten().min_by(|a, b| off_m(*a).total_cmp(&off_m(*b)));
             points.push((point, chirp, nearest));
         }
-        if self.returns == Returns::All {
+        if self.reported.returns == Returns::All {
             points.sort_by_cached_key(|(point, _, nearest)| {
                 let off_m = nearest.map_or(0.0, |index| self.off_m(point, &shots[index]));
                 // Of distances, which are positive, the bits have the same order.
@@ -298,13 +280,14 @@ impl Scan<'_> {
             return;
         };
         let behind_m = self.expected_m(&shots[reported]);
-        let limit_w = match self.returns {
+        let limit_w = match self.reported.returns {
             Returns::Strongest => observations[reported].power_w,
             Returns::First => Some(NO_LIMIT_W),
             Returns::All => None,
         };
         for (shot, other) in shots.iter().zip(observations) {
-            let is_hidden = self.returns == Returns::Strongest || self.expected_m(shot) > behind_m;
+            let is_hidden =
+                self.reported.returns == Returns::Strongest || self.expected_m(shot) > behind_m;
             if other.power_w.is_none() && is_hidden {
                 other.limit_w = limit_w.or(other.limit_w);
             }
@@ -313,7 +296,7 @@ impl Scan<'_> {
 
     /// The highest power of a false alarm, W.
     fn most_alarm_w(&self) -> f64 {
-        MOST_OVER_THRESHOLD * self.threshold_w
+        MOST_OVER_THRESHOLD * self.reported.threshold_w
     }
 
     /// Whether a detection away from the target may be of noise: on its chirp's ray, at most 6 dB above the threshold, and the
@@ -321,7 +304,7 @@ impl Scan<'_> {
     fn is_alarm(&self, point: &CloudPoint, shot: &Shot, spoke: &mut HashSet<u32>) -> bool {
         off_ray_m(point, &shot.ray).length() <= ON_RAY_M
             && point.power_w <= self.most_alarm_w()
-            && (spoke.insert(shot.chirp) || self.returns == Returns::All)
+            && (spoke.insert(shot.chirp) || self.reported.returns == Returns::All)
     }
 
     /// Assigns points to chirps by their numbers or by their directions. A stray still counts for the target
@@ -338,7 +321,9 @@ impl Scan<'_> {
         let (mut strays, mut on_target, mut second) = (Vec::new(), 0, 0);
         let (mut past_the_edge, mut chirps_with_points) = (HashSet::new(), HashSet::new());
         let mut spoke = HashSet::new();
-        let mut alarms = Alarms { weight: 1.0, returns: self.returns, ..Alarms::default() };
+        let mut beside = Vec::new();
+        let Reported { returns, gate_cells: cells, cell_m, .. } = self.reported;
+        let mut alarms = Alarms { weight: 1.0, returns, cells, cell_m, ..Alarms::default() };
         for (point, chirp, index) in self.in_order(cloud, by_number, shots, &shots_of_chirp) {
             chirps_with_points.extend(chirp);
             if let Some((shot, observation)) =
@@ -355,16 +340,18 @@ impl Scan<'_> {
                     on_target += 1;
                     *observation = Observation::detected(point.power_w, Some(range_m));
                     // Noise hardly ever reaches more.
-                    if self.returns == Returns::Strongest && point.power_w <= self.most_alarm_w() {
+                    if self.reported.returns == Returns::Strongest
+                        && point.power_w <= self.most_alarm_w()
+                    {
                         alarms.stronger_w.push(point.power_w);
                     }
-                } else if (!is_near || self.returns == Returns::All)
+                } else if (!is_near || self.reported.returns == Returns::All)
                     && self.is_alarm(point, shot, &mut spoke)
                 {
                     let own = shots_of_chirp.get(&shot.chirp).cloned().unwrap_or_default();
                     for (shot, one) in shots[own.clone()].iter().zip(&mut observations[own]) {
                         let is_open = one.power_w.is_none();
-                        match self.returns {
+                        match self.reported.returns {
                             Returns::Strongest if is_open => one.limit_w = Some(point.power_w),
                             Returns::First if is_open && range_m < self.expected_m(shot) => {
                                 one.limit_w = Some(NO_LIMIT_W);
@@ -372,7 +359,7 @@ impl Scan<'_> {
                             _ => {}
                         }
                     }
-                    if self.returns == Returns::First {
+                    if self.reported.returns == Returns::First {
                         alarms.of_target += 1;
                     } else {
                         alarms.powers_w.push(point.power_w);
@@ -387,12 +374,13 @@ impl Scan<'_> {
                 let shot = sent.map(|index| Shot::missed(self.chirps, index, progress[index]));
                 let range_m = shot.map_or(0.0, |shot| self.range_m(point, &shot));
                 if let Some(shot) = shot {
-                    if is_past_an_edge(point, &shot, target.as_ref()) {
-                        let is_first = past_the_edge.insert(shot.chirp);
-                        on_target += usize::from(is_first);
-                        second += usize::from(!is_first);
-                    } else if self.is_alarm(point, &shot, &mut spoke) {
-                        alarms.powers_w.push(point.power_w);
+                    let may_be_alarm = self.is_alarm(point, &shot, &mut spoke);
+                    let power_w = point.power_w;
+                    if let Some(off_m) = off_target_m(point, &shot, target.as_ref()) {
+                        beside.push(Beside { shot, range_m, power_w, off_m, may_be_alarm });
+                        continue;
+                    } else if may_be_alarm {
+                        alarms.powers_w.push(power_w);
                         alarms.of_misses.push((shot, range_m));
                         continue;
                     }
@@ -400,21 +388,34 @@ impl Scan<'_> {
                 strays.push(Stray { shot, range_m });
             }
         }
-        for own in shots_of_chirp.values().filter(|own| own.len() > 1) {
-            self.limit_others(&shots[own.clone()], &mut observations[own.clone()]);
-        }
         let rays = self.chirps.rays.iter().zip(&self.chirps.number);
         let (missing, numbers): (Vec<&Ray<Global>>, Vec<&u32>) =
             rays.filter(|(_, number)| !shots_of_chirp.contains_key(*number)).unzip();
+        let lengths_m = lengths_near_m(&missing, shots, target.as_ref());
+        let near = reach(&beside, lengths_m, &alarms);
+        alarms.near_m = lengths_m[near];
+        for Beside { shot, range_m, power_w, off_m, .. } in beside {
+            if off_m > SHELLS_M[near] {
+                alarms.powers_w.push(power_w);
+                alarms.of_misses.push((shot, range_m));
+                continue;
+            }
+            let is_first = past_the_edge.insert(shot.chirp);
+            on_target += usize::from(is_first);
+            second += usize::from(!is_first);
+            strays.push(Stray { shot: Some(shot), range_m });
+        }
+        for own in shots_of_chirp.values().filter(|own| own.len() > 1) {
+            self.limit_others(&shots[own.clone()], &mut observations[own.clone()]);
+        }
         let spoke_not = numbers.into_iter().filter(|number| !chirps_with_points.contains(*number));
         alarms.silent_misses = spoke_not.count();
-        alarms.silent = match self.returns {
+        alarms.silent = match self.reported.returns {
             // Chirps without any detection.
             Returns::Strongest => self.chirps.rays.len().saturating_sub(chirps_with_points.len()),
             Returns::First => alarms.silent_misses,
             Returns::All => self.chirps.rays.len(),
         };
-        alarms.near_m = length_near_m(&missing, shots, target.as_ref());
         let cloud_match = CloudMatch { observations, strays, alarms };
         Assignment { cloud_match, on_target, second, sent: [shots_of_chirp.len(), missing.len()] }
     }
@@ -442,26 +443,10 @@ impl Directions {
     }
 }
 
-/// Whether a point lies on its chirp's ray and near the target, which that ray misses.
-fn is_past_an_edge(point: &CloudPoint, shot: &Shot, target: Option<&Nearest>) -> bool {
+/// Distance of a point on its chirp's ray from the target, m, which that ray misses; none where it is not near.
+fn off_target_m(point: &CloudPoint, shot: &Shot, target: Option<&Nearest>) -> Option<f64> {
     let nearest_m = target.map_or(f64::INFINITY, |target| target.find(point.point.xyz).1);
-    nearest_m <= GATE_M && off_ray_m(point, &shot.ray).length() <= ON_RAY_M
-}
-
-/// Length of rays near the target that miss it, on average, m.
-fn length_near_m(missing: &[&Ray<Global>], shots: &[Shot], target: Option<&Nearest>) -> f64 {
-    /// Places that are tried on each ray.
-    const PLACES: usize = 32;
-    let Some(target) = target else { return 0.0 };
-    let ranges_m = shots.iter().map(|shot| shot.hit.range_m);
-    let from_m = ranges_m.clone().fold(f64::INFINITY, f64::min) - GATE_M;
-    let step_m = (ranges_m.fold(0.0, f64::max) + GATE_M - from_m) / PLACES as f64;
-    let near = missing.par_iter().map(|ray| {
-        let at_m = |step: usize| from_m + (step as f64 + 0.5) * step_m;
-        let places = (0..PLACES).map(|step| ray.origin.xyz + at_m(step) * ray.direction.xyz());
-        places.filter(|place| target.find(*place).1 <= GATE_M).count()
-    });
-    step_m * near.sum::<usize>() as f64 / missing.len().max(1) as f64
+    (nearest_m <= GATE_M && off_ray_m(point, &shot.ray).length() <= ON_RAY_M).then_some(nearest_m)
 }
 
 /// How many false alarms lie beside an edge by chance, where others do not; 0 where the length of the gate is unknown.

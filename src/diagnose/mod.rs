@@ -26,6 +26,7 @@
 
 mod alarms;
 mod answer;
+mod beside;
 mod choose;
 mod clouds;
 mod contradiction;
@@ -78,7 +79,7 @@ pub use alarms::{Alarms, FalseAlarms};
 pub use error::DiagnoseError;
 pub use evidence::{Candidate, CloudGain, Evidence};
 pub use folds::Folds;
-pub use matching::{CloudMatch, Stray, match_cloud};
+pub use matching::{CloudMatch, Reported, Stray, match_cloud};
 pub use observation::{Observation, ReceiverLimits};
 pub use report::{
     Base, BaseValue, BeforeAfter, CloudPart, Contradiction, Control, Controls, FoundEffect,

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::error::DiagnoseError;
-use super::matching::{match_cloud, match_parted};
+use super::matching::{Reported, match_cloud};
 use super::observation::ReceiverLimits;
 use super::report::{MeshPose, Report};
 use super::settings::Diagnosis;
@@ -13,7 +13,7 @@ use super::unresolved::Unresolved;
 use crate::brdf::Brdf;
 use crate::effects::{Antenna, Effect, MOST_LOOKS, Receiver, Shot, Stage, middle};
 use crate::measure::Cloud;
-use crate::radar::{Link, Radar, RadarError, RangeProcessor};
+use crate::radar::{Link, Radar, RadarError, RangeProcessor, Returns};
 use crate::render::{Setup, Sheet, Surface};
 use crate::scene::Scene;
 use crate::trace::{Bvh, ScanGeometry};
@@ -105,15 +105,17 @@ pub fn diagnose_together(
         stage.middle = middle(&own);
         // The cloud against the chirps.
         let ReceiverLimits { threshold_w, .. } = declared;
-        let chirps = &scene.chirps;
-        let mut matched = if radar.receiver.is_some() && scene.file.bounce.is_some() {
-            let parted_m = [radar.range_cell_m(), radar.spot_fwhm_m()];
-            match_parted(cloud, chirps, &own, threshold_w, parted_m)?
-        } else {
-            match_cloud(cloud, chirps, &own, threshold_w, radar.returns, antenna)?
+        let is_parted = radar.receiver.is_some() && scene.file.bounce.is_some();
+        let cell_m = radar.chirp().range_resolution_m();
+        let reported = Reported {
+            threshold_w,
+            returns: if is_parted { Returns::Strongest } else { radar.returns },
+            antenna: antenna.filter(|_| !is_parted),
+            parted_m: is_parted.then(|| [radar.range_cell_m(), radar.spot_fwhm_m()]),
+            gate_cells: radar.gate_cells(),
+            cell_m,
         };
-        matched.alarms.cells = radar.gate_cells();
-        matched.alarms.cell_m = radar.chirp().range_resolution_m();
+        let mut matched = match_cloud(cloud, &scene.chirps, &own, reported)?;
         matched.alarms.looks = radar.noise_looks();
         let of_strays = matched.strays.iter_mut().filter_map(|stray| stray.shot.as_mut());
         own.iter_mut().chain(of_strays).for_each(|shot| shot.scan = number as u16);

@@ -503,6 +503,11 @@ fn a_scan_with_too_little_says_so() {
     assert!(matches!(far, DiagnoseError::FarOff { .. }), "{far}");
 }
 
+/// What a radar of this kind reports, of a gate that is not declared.
+fn reported(returns: Returns) -> Reported {
+    Reported { threshold_w: THRESHOLD_W, returns, ..Reported::default() }
+}
+
 #[test]
 fn a_cloud_finds_its_shots() {
     use crate::measure::cloud::{Cloud, CloudPoint};
@@ -522,7 +527,7 @@ fn a_cloud_finds_its_shots() {
     let numbered = Cloud::new(points.clone()).unwrap();
     points.push(point(&shots[9], missed, 0.0));
     let cloud = Cloud::new(points.clone()).unwrap();
-    let found = match_cloud(&cloud, chirps, &shots, THRESHOLD_W, Returns::Strongest, None).unwrap();
+    let found = match_cloud(&cloud, chirps, &shots, reported(Returns::Strongest)).unwrap();
     let [behind, beside] = &found.strays[..] else { panic!("{:?}", found.strays) };
     assert_eq!(behind.shot, Some(shots[8]));
     assert!((behind.range_m - shots[8].hit.range_m - 0.5).abs() < 1e-9);
@@ -532,8 +537,7 @@ fn a_cloud_finds_its_shots() {
     points.pop();
     points.iter_mut().for_each(|point| point.chirp = None);
     let cloud = Cloud::new(points.clone()).unwrap();
-    let by_direction =
-        match_cloud(&cloud, chirps, &shots, THRESHOLD_W, Returns::Strongest, None).unwrap();
+    let by_direction = match_cloud(&cloud, chirps, &shots, reported(Returns::Strongest)).unwrap();
     assert_eq!(by_direction.observations, found.observations);
     // Points with the numbers of other chirps are refused.
     for off in [1, -1] {
@@ -541,14 +545,8 @@ fn a_cloud_finds_its_shots() {
         for point in &mut points {
             point.chirp = point.chirp.and_then(|chirp| chirp.checked_add_signed(off));
         }
-        let refused = match_cloud(
-            &Cloud::new(points).unwrap(),
-            chirps,
-            &shots,
-            THRESHOLD_W,
-            Returns::Strongest,
-            None,
-        );
+        let refused =
+            match_cloud(&Cloud::new(points).unwrap(), chirps, &shots, reported(Returns::Strongest));
         let Err(DiagnoseError::Misnumbered { off: found }) = refused else { panic!("{refused:?}") };
         assert_eq!(found, i64::from(off));
     }
@@ -568,21 +566,13 @@ fn a_cloud_finds_its_shots() {
             .map(|point| CloudPoint { chirp: point.chirp.map(|chirp| chirp + first), ..*point });
         let cloud = Cloud::new(of_pass.collect()).unwrap();
         let found =
-            match_cloud(&cloud, &passes, &shots_twice, THRESHOLD_W, Returns::Strongest, None)
-                .unwrap();
+            match_cloud(&cloud, &passes, &shots_twice, reported(Returns::Strongest)).unwrap();
         assert_eq!(found.observations.iter().filter(|o| o.power_w.is_some()).count(), 8);
     }
     // Row numbers in place of chirp numbers are refused.
     let given = |points: Vec<CloudPoint>| {
-        match_cloud(
-            &Cloud::new(points).unwrap(),
-            chirps,
-            &shots,
-            THRESHOLD_W,
-            Returns::Strongest,
-            None,
-        )
-        .unwrap_err()
+        match_cloud(&Cloud::new(points).unwrap(), chirps, &shots, reported(Returns::Strongest))
+            .unwrap_err()
     };
     let on_target = &numbered.points()[..8];
     let rows =
@@ -605,14 +595,8 @@ fn a_cloud_finds_its_shots() {
     assert!(matches!(twice, DiagnoseError::Repeated { second: 8, points: 16 }), "{twice}");
     // A cloud of something else is refused.
     points.iter_mut().for_each(|p| p.point = Point::from(p.point.xyz + DVec3::new(0.0, 0.0, 3.0)));
-    let elsewhere = match_cloud(
-        &Cloud::new(points).unwrap(),
-        chirps,
-        &shots,
-        THRESHOLD_W,
-        Returns::Strongest,
-        None,
-    );
+    let elsewhere =
+        match_cloud(&Cloud::new(points).unwrap(), chirps, &shots, reported(Returns::Strongest));
     assert!(matches!(elsewhere, Err(DiagnoseError::Elsewhere { matched: 0, points: 9 })));
     assert!((found.observations[20].power_w.unwrap() - 1e-9).abs() < 1e-20);
     assert!((found.observations[20].range_m.unwrap() - shots[20].hit.range_m - 1e-3).abs() < 1e-9);
@@ -636,7 +620,7 @@ fn a_false_alarm_at_the_target_says_what_its_kind_of_return_says() {
     points.extend((20..28).map(|shot| point(shot, 1e-3, 1e-9)));
     let matched = |points: &[CloudPoint], returns| {
         let cloud = Cloud::new(points.to_vec()).unwrap();
-        match_cloud(&cloud, chirps, &shots, THRESHOLD_W, returns, None).unwrap()
+        match_cloud(&cloud, chirps, &shots, reported(returns)).unwrap()
     };
     let limits = |found: &CloudMatch| [before, behind].map(|shot| found.observations[shot].limit_w);
     let strongest = matched(&points, Returns::Strongest);
@@ -691,7 +675,7 @@ fn false_alarms_of_chirps_that_miss_may_be_the_most_of_a_cloud() {
     let matched = |echoes: usize| {
         let echoes = shots.iter().take(echoes).map(echo);
         let cloud = Cloud::new(noise.iter().copied().chain(echoes).collect()).unwrap();
-        match_cloud(&cloud, chirps, &shots, THRESHOLD_W, Returns::Strongest, None)
+        match_cloud(&cloud, chirps, &shots, reported(Returns::Strongest))
     };
     let found = matched(shots.len()).unwrap();
     assert!(noise.len() > shots.len() && found.alarms.of_misses.len() == noise.len());
@@ -724,7 +708,7 @@ fn a_wide_spot_sees_past_the_edge() {
         Cloud::new(chirps.number.iter().zip(&chirps.rays).filter_map(point).collect()).unwrap()
     };
     let seen = cloud(0.0);
-    let found = match_cloud(&seen, chirps, &shots, THRESHOLD_W, Returns::Strongest, None).unwrap();
+    let found = match_cloud(&seen, chirps, &shots, reported(Returns::Strongest)).unwrap();
     assert!(found.strays.len() * 3 > seen.points().len(), "{}", found.strays.len());
     // The radar's own beam, of 16 mm, reaches some of them, of the 80 mm beside the plate.
     let model = Model { laws: vec![law()], receiver: receiver(), effects: vec![], level: 1.0 };
@@ -737,11 +721,10 @@ fn a_wide_spot_sees_past_the_edge() {
     let mut twice = [seen.points(), &strays, &strays].concat();
     twice.iter_mut().for_each(|point| point.chirp = None);
     let twice = Cloud::new(twice).unwrap();
-    let twice =
-        match_cloud(&twice, chirps, &shots, THRESHOLD_W, Returns::Strongest, None).unwrap_err();
+    let twice = match_cloud(&twice, chirps, &shots, reported(Returns::Strongest)).unwrap_err();
     assert!(matches!(twice, DiagnoseError::Repeated { .. }), "{twice}");
-    let behind = match_cloud(&cloud(0.5), chirps, &shots, THRESHOLD_W, Returns::Strongest, None)
-        .unwrap_err();
+    let behind =
+        match_cloud(&cloud(0.5), chirps, &shots, reported(Returns::Strongest)).unwrap_err();
     assert!(matches!(behind, DiagnoseError::Elsewhere { matched: 0, .. }), "{behind}");
 }
 
@@ -968,7 +951,7 @@ fn a_reported_echo_limits_the_others_of_its_chirp() {
     let mut points = vec![point(40, near_w), point(43, far_w)];
     let observed = |points: &[CloudPoint], returns| {
         let cloud = Cloud::new(points.to_vec()).unwrap();
-        let found = match_cloud(&cloud, &bench.chirps, &shots, THRESHOLD_W, returns, None).unwrap();
+        let found = match_cloud(&cloud, &bench.chirps, &shots, reported(returns)).unwrap();
         assert!(found.strays.is_empty());
         let seen = &found.observations[40..46];
         seen.iter().map(|one| (one.power_w.is_some(), one.limit_w)).collect::<Vec<_>>()
