@@ -248,7 +248,10 @@ fn bad_input_is_refused_with_a_sentence_and_nothing_is_stored() {
         ("scan.csv --model mixtur", "did you mean `mixture`?"),
         ("scan.csv --model qqqqqq", "name a material or one of blinn-phong"),
         ("scan.csv --model cotton", "nothing is left to fit"),
-        ("scan.csv --method tls-tail", "give it with --alpha"),
+        (
+            "scan.csv --method tls-tail",
+            "hold it, or use the method tls to find it (--alpha, --method)",
+        ),
         ("scan.csv --model lambert --alpha 3", "this model has no alpha"),
         ("scan.csv --fix alpha", "write it as --fix diffuse.alpha=3"),
         ("scan.csv --fix diffuse.alpa=3", "there are: k"),

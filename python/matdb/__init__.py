@@ -6,16 +6,22 @@
 True
 """
 
+import signal
 import sys
 
+from ._errors import UnknownMaterialError
 from ._matdb import (
+    CatalogueError,
     Cloud,
+    CloudError,
     Comparison,
     Database,
+    DiagnoseError,
     Diagnosis,
     Error,
     FileError,
     Fit,
+    FitError,
     Material,
     MaterialError,
     Measurement,
@@ -40,13 +46,17 @@ from ._matdb import (
 from ._matdb import _run
 
 __all__ = [
+    "CatalogueError",
     "Cloud",
+    "CloudError",
     "Comparison",
     "Database",
+    "DiagnoseError",
     "Diagnosis",
     "Error",
     "FileError",
     "Fit",
+    "FitError",
     "Material",
     "MaterialError",
     "Measurement",
@@ -56,6 +66,7 @@ __all__ = [
     "Scene",
     "SceneError",
     "StoreError",
+    "UnknownMaterialError",
     "UsageError",
     "View",
     "__version__",
@@ -72,4 +83,6 @@ __all__ = [
 
 def _main() -> int:
     """The command line."""
+    # As any other program, it ends at once on Ctrl-C.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
     return _run(["matdb", *sys.argv[1:]])

@@ -9,13 +9,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
+    "CatalogueError",
     "Cloud",
+    "CloudError",
     "Comparison",
     "Database",
+    "DiagnoseError",
     "Diagnosis",
     "Error",
     "FileError",
     "Fit",
+    "FitError",
     "Material",
     "MaterialError",
     "Measurement",
@@ -44,13 +48,20 @@ __version__: str
 _Record: TypeAlias = dict[str, Any]
 _Name: TypeAlias = str | PathLike[str]
 
-class Error(Exception): ...
+class Error(Exception):
+    file: Path | None
+    hint: str | None
+
 class UsageError(Error): ...
 class SceneError(Error): ...
 class MaterialError(Error): ...
 class StoreError(Error): ...
 class RenderError(Error): ...
 class FileError(Error): ...
+class CloudError(Error): ...
+class FitError(Error): ...
+class DiagnoseError(Error): ...
+class CatalogueError(Error): ...
 
 @final
 class Material:
@@ -86,10 +97,11 @@ class Database:
         self,
         *names: str | Fit,
         files: Sequence[_Name] = ...,
+        name: str | None = None,
         source: str | None = None,
         licence: str | None = None,
-        kind: str = "measured",
-        material_class: str = "sample",
+        kind: str | None = None,
+        material_class: str | None = None,
         description: str | None = None,
         instrument: str | None = None,
         frequency_ghz: float | None = None,
@@ -130,6 +142,8 @@ class Fit:
     @property
     def covariance(self) -> NDArray[np.float64]: ...
     @property
+    def is_retro(self) -> NDArray[np.bool_]: ...
+    @property
     def theta_deg(self) -> NDArray[np.float64]: ...
     @property
     def levels_db(self) -> NDArray[np.float64]: ...
@@ -153,6 +167,14 @@ def fit(
 
 @final
 class Scene:
+    def __new__(
+        cls,
+        *,
+        meshes: Mapping[str, Any],
+        materials: str | Mapping[str, str] | None = None,
+        name: str | None = None,
+        **tables: Any,
+    ) -> Scene: ...
     @staticmethod
     def from_text(text: str, path: _Name) -> Scene: ...
     @property
@@ -165,6 +187,9 @@ class Scene:
     def text(self) -> str: ...
     def to_dict(self) -> _Record: ...
     def replace(self, **changes: Any) -> Scene: ...
+    def save(self, path: _Name) -> None: ...
+    @staticmethod
+    def _of_parts(text: str, path: _Name, given: dict[str, Any]) -> Scene: ...
 
 def load_scene(path: _Name) -> Scene: ...
 
@@ -179,11 +204,14 @@ class Measurement:
     @property
     def record(self) -> _Record: ...
     @property
+    def pose(self) -> _Record: ...
+    @property
     def notices(self) -> list[str]: ...
     def fit(
         self,
         model: str | None = None,
         *,
+        db: Database | None = None,
         method: str = "censored",
         fixed: Mapping[str, float] | None = None,
         looks: float | None = None,
@@ -196,7 +224,7 @@ class Measurement:
     def __len__(self) -> int: ...
 
 def measure(
-    cloud: Cloud | _Name, scene: Scene | _Name, *, region: str | None = None, pose: _Name | None = None
+    cloud: Cloud | Scan | _Name, scene: Scene | _Name, *, region: str | None = None, pose: _Name | None = None
 ) -> Measurement: ...
 
 @final
@@ -220,11 +248,22 @@ class View:
     @property
     def threshold_w(self) -> float: ...
     def __len__(self) -> int: ...
+    @staticmethod
+    def _of_parts(
+        image: dict[str, Any],
+        cloud: dict[str, Any],
+        axes: tuple[NDArray[np.float64], NDArray[np.float64]],
+        corner_m: Sequence[float],
+        pixel_m: float,
+        threshold_w: float,
+    ) -> View: ...
 
 @final
 class Scan:
     @property
     def name(self) -> str: ...
+    @property
+    def scene(self) -> Scene: ...
     @property
     def views(self) -> Mapping[str, View]: ...
     @property
@@ -249,9 +288,17 @@ class Scan:
     def file_names(self) -> list[str]: ...
     def file(self, name: str) -> bytes: ...
     def save(self, folder: _Name) -> None: ...
-    def show(self) -> Page: ...
+    def show(self, *, view: str = "radar") -> Page: ...
     def plot(self, ax: Any = None) -> Any: ...
     def _repr_png_(self) -> bytes: ...
+    @staticmethod
+    def _of_parts(
+        scene: Scene,
+        files: Sequence[tuple[str, bytes]],
+        views: Sequence[tuple[str, View]],
+        notices: Sequence[str],
+        materials: Sequence[str],
+    ) -> Scan: ...
 
 @final
 class Page:
@@ -271,11 +318,26 @@ class Cloud:
         range_m: ArrayLike | None = None,
     ) -> Cloud: ...
     @staticmethod
-    def load(path: _Name) -> Cloud: ...
+    def load(
+        path: _Name,
+        *,
+        unit: str = "m",
+        power: str = "dbm",
+        columns: Mapping[str, str] | None = None,
+        target_frame_of: Scene | None = None,
+    ) -> Cloud: ...
     @property
     def xyz_m(self) -> NDArray[np.float64]: ...
     @property
     def power_dbm(self) -> NDArray[np.float64]: ...
+    @property
+    def is_relative(self) -> bool: ...
+    @property
+    def chirp(self) -> NDArray[np.float64]: ...
+    @property
+    def range_m(self) -> NDArray[np.float64]: ...
+    @staticmethod
+    def _of_columns(columns: Sequence[tuple[str, NDArray[np.float64]]]) -> Cloud: ...
     @property
     def notices(self) -> list[str]: ...
     def __len__(self) -> int: ...
@@ -292,7 +354,7 @@ class Comparison:
     def _repr_png_(self) -> bytes: ...
 
 def compare(
-    cloud: Cloud | _Name,
+    cloud: Cloud | Scan | _Name,
     scene: Scene | _Name,
     *,
     db: Database | None = None,
@@ -300,7 +362,7 @@ def compare(
     fit: str | None = None,
 ) -> Comparison: ...
 def calibrate(
-    cloud: Cloud | _Name, scene: Scene | _Name, *, db: Database | None = None, within_db: float = ...
+    cloud: Cloud | Scan | _Name, scene: Scene | _Name, *, db: Database | None = None, within_db: float = ...
 ) -> _Record: ...
 
 @final
@@ -318,7 +380,7 @@ class Diagnosis:
     def save(self, folder: _Name) -> None: ...
 
 def diagnose(
-    cloud: Cloud | _Name,
+    cloud: Cloud | Scan | _Name,
     scene: Scene | _Name,
     *,
     db: Database | None = None,
@@ -326,5 +388,5 @@ def diagnose(
     seed: int = 0,
     controls: bool = True,
 ) -> Diagnosis: ...
-def render(scene: Scene, *, db: Database | None = None, seed: int | None = None) -> Scan: ...
-def _run(words: Sequence[str]) -> int: ...
+def render(scene: Scene | _Name, *, db: Database | None = None, seed: int | None = None) -> Scan: ...
+def _run(words: Sequence[_Name]) -> int: ...

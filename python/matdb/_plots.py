@@ -45,8 +45,10 @@ def measurement(measured: Measurement, ax: Any = None) -> Any:
 def fit(fitted: Fit, ax: Any = None) -> Any:
     """The levels of a curve, and the fitted law over them."""
     ax = _axes(ax)
+    # A law over one angle is backscatter.
+    retro = fitted.is_retro
     theta_deg = np.linspace(0, float(np.nanmax(fitted.theta_deg)), 300)
-    ax.plot(fitted.theta_deg, fitted.levels_db, ".", markersize=2, color="0.6", label="detected")
+    ax.plot(fitted.theta_deg[retro], fitted.levels_db[retro], ".", markersize=2, color="0.6", label="detected")
     ax.plot(theta_deg, fitted.sigma0_db(theta_deg), label="fit")
     ax.set(xlabel="incidence, °", ylabel="σ⁰, dB")
     ax.legend()

@@ -1,20 +1,24 @@
 //! Measured points, of arrays or of a file.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use matdb::adopt::input;
 use matdb::error::Error;
 use matdb::files::read_whole;
-use matdb::frames::Point;
-use matdb::material::Input;
-use matdb::measure::{self, CloudPoint, CloudReading};
+use matdb::formats::{ColumnNames, PointTable};
+use matdb::material::{Input, Scale};
+use matdb::measure::{self, CloudPoint, CloudReading, PowerUnit};
 use matdb::setup::read_cloud;
-use matdb::units::{dbm_from_watts, watts_from_dbm};
+use matdb::units::dbm_from_watts;
 use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2, PyArrayMethods};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
 
-use crate::error::raised;
+use crate::error::{UsageError, raised};
+use crate::scan::Scan;
+use crate::scene::Scene;
 
 /// Name of a cloud that is in no file.
 const POINTS: &str = "points";
@@ -26,37 +30,57 @@ pub(crate) struct Cloud {
 }
 
 /// A cloud as an argument: points, or their file.
-#[derive(FromPyObject)]
 pub(crate) enum CloudLike {
     Cloud(Py<Cloud>),
+    /// What the radar of a rendering measured.
+    Simulated(Py<Cloud>),
     File(PathBuf),
+}
+
+impl<'py> FromPyObject<'_, 'py> for CloudLike {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<CloudLike> {
+        if let Ok(cloud) = given.cast::<Cloud>() {
+            return Ok(CloudLike::Cloud(cloud.to_owned().unbind()));
+        }
+        if let Ok(scan) = given.cast::<Scan>() {
+            return Ok(CloudLike::Simulated(Py::new(given.py(), scan.get().points(given.py())?)?));
+        }
+        let given = given.extract().map(CloudLike::File);
+        given.map_err(|_| {
+            PyTypeError::new_err("give a matdb.Cloud, a matdb.Scan or the path of a file")
+        })
+    }
 }
 
 impl CloudLike {
     /// The file, or a name in its place.
     pub(crate) fn path(&self) -> &Path {
         match self {
-            CloudLike::Cloud(_) => Path::new(POINTS),
+            CloudLike::Cloud(_) | CloudLike::Simulated(_) => Path::new(POINTS),
             CloudLike::File(path) => path,
         }
     }
 
-    pub(crate) fn is_file(&self) -> bool {
-        matches!(self, CloudLike::File(_))
+    pub(crate) fn is_simulated(&self) -> bool {
+        matches!(self, CloudLike::Simulated(_))
     }
 
     /// The points.
-    pub(crate) fn read(&self) -> Result<measure::Cloud, Error> {
+    pub(crate) fn read(&self) -> Result<Cow<'_, measure::Cloud>, Error> {
         match self {
-            CloudLike::Cloud(cloud) => Ok(cloud.get().cloud.clone()),
-            CloudLike::File(path) => read_cloud(path, &CloudReading::default()),
+            CloudLike::Cloud(cloud) | CloudLike::Simulated(cloud) => {
+                Ok(Cow::Borrowed(&cloud.get().cloud))
+            }
+            CloudLike::File(path) => read_cloud(path, &CloudReading::default()).map(Cow::Owned),
         }
     }
 
     /// What the points are, for a record.
     pub(crate) fn input(&self) -> Result<Input, Error> {
         let bytes = match self {
-            CloudLike::Cloud(cloud) => {
+            CloudLike::Cloud(cloud) | CloudLike::Simulated(cloud) => {
                 let points = cloud.get().cloud.points().iter();
                 let numbers = points.flat_map(|point| {
                     let [x, y, z] = point.point.xyz.to_array();
@@ -70,6 +94,15 @@ impl CloudLike {
     }
 }
 
+impl Cloud {
+    /// The detections of a table, which has the columns of a file.
+    pub(crate) fn of_columns(columns: Vec<(String, Vec<f64>)>) -> Result<Cloud, Error> {
+        let cloud = CloudReading::default().read_table(PointTable::of_columns(columns));
+        let cloud = cloud.map_err(|error| Error::Cloud { file: PathBuf::from(POINTS), error })?;
+        Ok(Cloud { cloud })
+    }
+}
+
 #[pymethods]
 impl Cloud {
     /// Detections of arrays.
@@ -77,56 +110,95 @@ impl Cloud {
     /// Parameters
     /// ----------
     /// xyz_m : array_like, (n, 3)
-    ///     Places in the global frame, m.
+    ///     Places in the global frame, m. Points with NaN are left out.
     /// power_dbm : array_like, (n,)
     ///     Received power, dBm.
     /// chirp : array_like of int, (n,), optional
-    ///     Numbers of the chirps; without them each point is of the chirp in whose direction it lies.
+    ///     Numbers of the chirps; a point without one, or with NaN, is of the chirp in whose direction it lies.
     /// range_m : array_like, (n,), optional
-    ///     Measured ranges, m; without them those of the places.
+    ///     Measured ranges, m; those of the places without them, or where they are NaN.
     ///
     /// Raises
     /// ------
     /// ValueError
     ///     Arrays whose lengths differ.
     /// matdb.Error
-    ///     No point, numbers that are not finite, and powers that nothing receives.
+    ///     No point, numbers that are not finite, powers in watts, and powers that nothing receives.
     #[new]
     #[pyo3(signature = (xyz_m, power_dbm, *, chirp = None, range_m = None))]
     fn new<'py>(
+        py: Python<'py>,
         xyz_m: PyArrayLike2<'py, f64, AllowTypeChange>,
         power_dbm: PyArrayLike1<'py, f64, AllowTypeChange>,
-        chirp: Option<PyArrayLike1<'py, u32, AllowTypeChange>>,
+        chirp: Option<PyArrayLike1<'py, f64, AllowTypeChange>>,
         range_m: Option<PyArrayLike1<'py, f64, AllowTypeChange>>,
     ) -> PyResult<Cloud> {
-        let (places, powers) = (xyz_m.as_array(), power_dbm.as_array());
-        let (chirps, ranges) =
-            (chirp.as_ref().map(|one| one.as_array()), range_m.as_ref().map(|one| one.as_array()));
-        let count = powers.len();
-        let lengths =
-            [Some(places.nrows()), chirps.map(|one| one.len()), ranges.map(|one| one.len())];
-        if places.ncols() != 3 || lengths.into_iter().flatten().any(|length| length != count) {
-            let shape = places.shape();
+        let places = xyz_m.as_array();
+        let others = [("power_dbm", Some(power_dbm)), ("chirp", chirp), ("range_m", range_m)];
+        let mut columns = Vec::new();
+        for (name, values) in &others {
+            if let Some(values) = values {
+                columns.push(((*name).to_owned(), values.as_array().to_vec()));
+            }
+        }
+        let is_even = columns.iter().all(|(_, values)| values.len() == places.nrows());
+        if places.ncols() != 3 || !is_even {
+            let lengths =
+                columns.iter().map(|(name, values)| format!("{name} ({},)", values.len()));
             return Err(PyValueError::new_err(format!(
-                "xyz_m has the shape {shape:?} and power_dbm {count} values; give (n, 3) and n of everything else"
+                "the shapes differ: xyz_m {:?}, {}; give (n, 3) and n of everything else",
+                places.shape(),
+                lengths.collect::<Vec<_>>().join(", ")
             )));
         }
-        let points = (0..count).map(|row| CloudPoint {
-            chirp: chirps.map(|one| one[row]),
-            point: Point::new(places[[row, 0]], places[[row, 1]], places[[row, 2]]),
-            range_m: ranges.map(|one| one[row]),
-            power_w: watts_from_dbm(powers[row]),
-        });
-        let cloud = measure::Cloud::new(points.collect());
-        let failed = |error| raised(Error::Cloud { file: PathBuf::from(POINTS), error });
-        Ok(Cloud { cloud: cloud.map_err(failed)? })
+        for (axis, name) in ["x_m", "y_m", "z_m"].into_iter().enumerate() {
+            columns.push((name.to_owned(), places.column(axis).to_vec()));
+        }
+        py.detach(|| Cloud::of_columns(columns)).map_err(raised)
     }
 
     /// The detections of a file: `.ply`, `.csv`, `.xyz`, `.pcd`, `.las` or `.laz`.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or os.PathLike
+    /// unit : str, default "m"
+    ///     Unit of the places where the columns do not name it: `m` or `mm`.
+    /// power : str, default "dbm"
+    ///     Unit of the power where the column does not name it: `dbm`, `w`, `relative` (dB of an unknown level) or `counts`.
+    /// columns : dict of str to str, optional
+    ///     Our names for columns of the file, as in `{"Intensity": "power_dbm"}`; `-` passes one over.
+    /// target_frame_of : Scene, optional
+    ///     The scene in whose target frame the places are; in the global frame without it.
     #[staticmethod]
-    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Cloud> {
-        let cloud = py.detach(|| read_cloud(&path, &CloudReading::default()));
-        Ok(Cloud { cloud: cloud.map_err(raised)? })
+    #[pyo3(signature = (path, *, unit = "m", power = "dbm", columns = None, target_frame_of = None))]
+    fn load(
+        py: Python<'_>,
+        path: PathBuf,
+        unit: &str,
+        power: &str,
+        columns: Option<&Bound<'_, PyDict>>,
+        target_frame_of: Option<&Scene>,
+    ) -> PyResult<Cloud> {
+        let reading = CloudReading {
+            metres_per_unit: match unit {
+                "m" => 1.0,
+                "mm" => 1e-3,
+                other => return Err(no_choice("unit", other, "m or mm")),
+            },
+            power: match power {
+                "dbm" => PowerUnit::Dbm,
+                "w" => PowerUnit::Watt,
+                "relative" => PowerUnit::RelativeDb,
+                "counts" => PowerUnit::Counts,
+                other => return Err(no_choice("power", other, "dbm, w, relative or counts")),
+            },
+            columns: columns.map_or(Ok(ColumnNames::default()), column_names)?,
+            global_from_target: target_frame_of
+                .map(|scene| scene.scene().radar().frames().global_from_target),
+        };
+        let cloud = py.detach(|| read_cloud(&path, &reading)).map_err(raised)?;
+        Ok(Cloud { cloud })
     }
 
     /// Places in the global frame, m: float64 (n, 3).
@@ -137,10 +209,30 @@ impl Cloud {
         flat.reshape([points.len(), 3])
     }
 
-    /// Received power, dBm: float64 (n,).
+    /// Received power, dBm: float64 (n,). Where `is_relative`, the strongest has 0.
     #[getter]
     fn power_dbm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_iter(py, self.cloud.points().iter().map(|one| dbm_from_watts(one.power_w)))
+    }
+
+    /// Whether the powers are known up to a common factor only.
+    #[getter]
+    fn is_relative(&self) -> bool {
+        self.cloud.scale == Scale::Relative
+    }
+
+    /// Numbers of the chirps: float64 (n,), NaN where there is none.
+    #[getter]
+    fn chirp<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let points = self.cloud.points().iter();
+        PyArray1::from_iter(py, points.map(|one| one.chirp.map_or(f64::NAN, f64::from)))
+    }
+
+    /// Measured ranges, m: float64 (n,), NaN where there is none.
+    #[getter]
+    fn range_m<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let points = self.cloud.points().iter();
+        PyArray1::from_iter(py, points.map(|one| one.range_m.unwrap_or(f64::NAN)))
     }
 
     /// What a person should not overlook, a sentence each.
@@ -156,4 +248,48 @@ impl Cloud {
     fn __repr__(&self) -> String {
         format!("<matdb.Cloud: {} points>", self.__len__())
     }
+
+    /// A cloud of the columns of a file, as pickle makes one.
+    #[staticmethod]
+    fn _of_columns(columns: Vec<(String, Bound<'_, PyArray1<f64>>)>) -> PyResult<Cloud> {
+        let columns = columns.into_iter().map(|(name, values)| Ok((name, values.to_vec()?)));
+        Cloud::of_columns(columns.collect::<PyResult<_>>()?).map_err(raised)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let (py, own) = (slf.py(), slf.get());
+        let points = own.cloud.points().iter();
+        let power = if own.is_relative() { "power_counts" } else { "power_w" };
+        let column =
+            |value: fn(&CloudPoint) -> f64| PyArray1::from_iter(py, points.clone().map(value));
+        let columns = vec![
+            ("x_m", column(|one| one.point.xyz.x)),
+            ("y_m", column(|one| one.point.xyz.y)),
+            ("z_m", column(|one| one.point.xyz.z)),
+            (power, column(|one| one.power_w)),
+            ("chirp", own.chirp(py)),
+            ("range_m", own.range_m(py)),
+        ];
+        (slf.get_type().getattr("_of_columns")?, (columns,)).into_pyobject(py)
+    }
+}
+
+/// The refusal of a word that is none of a few.
+pub(crate) fn no_choice(key: &str, given: &str, known: &str) -> PyErr {
+    UsageError::new_err(format!("{key} = {given:?} is not known; give {known}"))
+}
+
+/// Our names for columns, by theirs.
+fn column_names(names: &Bound<'_, PyDict>) -> PyResult<ColumnNames> {
+    if names.is_empty() {
+        return Ok(ColumnNames::default());
+    }
+    let mut pairs = Vec::new();
+    for (theirs, ours) in names {
+        pairs.push(format!("{}={}", theirs.extract::<String>()?, ours.extract::<String>()?));
+    }
+    pairs
+        .join(",")
+        .parse()
+        .map_err(|error: matdb::formats::FormatError| UsageError::new_err(error.to_string()))
 }

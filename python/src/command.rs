@@ -1,11 +1,13 @@
 //! The command line, which the wheel brings along.
 
+use std::ffi::OsString;
+
 use clap::Parser;
 use pyo3::prelude::*;
 
 /// Runs a command with these words, the program's name first. Returns its exit status.
 #[pyfunction]
-pub(crate) fn _run(py: Python<'_>, words: Vec<String>) -> i32 {
+pub(crate) fn _run(py: Python<'_>, words: Vec<OsString>) -> i32 {
     py.detach(|| {
         let cli = match matdb::cli::Cli::try_parse_from(words) {
             Ok(cli) => cli,

@@ -30,7 +30,7 @@ pub(crate) struct Comparison {
 ///
 /// Parameters
 /// ----------
-/// cloud : Cloud, str or os.PathLike
+/// cloud : Cloud, Scan, str or os.PathLike
 /// scene : Scene, str or os.PathLike
 ///     With the materials to judge.
 /// db : Database, optional
@@ -55,19 +55,18 @@ pub(crate) fn compare(
 ) -> PyResult<Comparison> {
     let scene = scene.scene(py)?;
     let scene = scene.get();
-    let store = db.map_or(Ok(None), Database::store)?;
-    let mean =
-        |pose| ReadyScene::new_mean(scene.scene().clone(), scene.path(), pose, store.as_ref());
-    let ready = pose.map_or(Ok(Pose::NONE), |file| read_pose(&file)).and_then(mean);
-    let mut ready = ready.map_err(raised)?;
-    drop(store);
     let compared = py.detach(|| {
+        let store = db.map_or(Ok(None), Database::read)?;
+        let pose = pose.map_or(Ok(Pose::NONE), |file| read_pose(&file))?;
+        let mut ready =
+            ReadyScene::new_mean(scene.scene().clone(), scene.path(), pose, store.as_ref())?;
+        drop(store);
         if let Some(name) = fit {
             ready.choose_fit(name)?;
         }
         let unstated = ready.check_footprints()?;
         let cloud_path = cloud.path();
-        let cloud = absolute(cloud.read()?, cloud_path)?;
+        let cloud = absolute(cloud.read()?.into_owned(), cloud_path)?;
         let comparison = report::Comparison::new(&ready, &cloud)?;
         let notices = [cloud.notices, ready.notices(), Vec::from_iter(unstated)].concat();
         let record = comparison.record(cloud_path, scene.path(), &notices);
@@ -80,7 +79,7 @@ pub(crate) fn compare(
 ///
 /// Parameters
 /// ----------
-/// cloud : Cloud, str or os.PathLike
+/// cloud : Cloud, Scan, str or os.PathLike
 /// scene : Scene, str or os.PathLike
 ///     Radar, scan and a single target, such as `builtin:calibration-plate`.
 /// db : Database, optional
@@ -106,13 +105,12 @@ pub(crate) fn calibrate<'py>(
     }
     let scene = scene.scene(py)?;
     let scene = scene.get();
-    let store = db.map_or(Ok(None), Database::store)?;
-    let ready = ReadyScene::new(scene.scene().clone(), scene.path(), store.as_ref());
-    let ready = ready.map_err(raised)?;
-    drop(store);
     let record = py.detach(|| -> Result<Value, Error> {
+        let store = db.map_or(Ok(None), Database::read)?;
+        let ready = ReadyScene::new(scene.scene().clone(), scene.path(), store.as_ref())?;
+        drop(store);
         let path = cloud.path();
-        let cloud = absolute(cloud.read()?, path)?;
+        let cloud = absolute(cloud.read()?.into_owned(), path)?;
         let report = CalibrationReport::new(&ready, &cloud, path, Calibration { within_db })?;
         let notices = [cloud.notices, ready.notices(), report.notices()].concat();
         Ok(report.record(path, scene.path(), &notices))

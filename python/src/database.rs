@@ -4,26 +4,27 @@ use std::path::PathBuf;
 
 use matdb::adopt::{
     CatalogueImport, CheckReport, CurveOrigin, DatabaseCheck, FitStorage, FittedMaterial,
-    NewMaterials, StoredFit, Withdrawal, remove_materials,
+    NewMaterials, Withdrawal, remove_materials,
 };
 use matdb::catalogue::exchange::{Details, Export, Format};
 use matdb::catalogue::{About, Citable, Credit, Diff, Rank, publish, references};
 use matdb::error::Error;
 use matdb::files::{folder_of, read_small, write_all};
-use matdb::material::{Slug, SourceKind, builtin};
+use matdb::material::{Slug, builtin};
 use matdb::report::{
     ExportReport, ExportRequest, MaterialSearch, NeighbourSearch, Prediction, revision_records,
 };
 use matdb::setup::{self, MaterialRevision, find_material};
 use matdb::store::{Filter, Store};
 use matdb::units::watts_from_dbm;
-use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use serde_json::json;
 
-use crate::error::{MaterialError, UsageError, raised};
+use crate::cloud::no_choice;
+use crate::error::{UsageError, raised, warn};
 use crate::fit::Fit;
+use crate::interrupt::interruptible;
 use crate::json::to_python;
 use crate::material::Material;
 
@@ -37,8 +38,17 @@ pub(crate) struct Database {
 
 impl Database {
     /// The file, if somebody has made it.
-    pub(crate) fn store(&self) -> PyResult<Option<Store>> {
-        Store::open_existing(&self.path).map_err(raised)
+    pub(crate) fn read(&self) -> Result<Option<Store>, Error> {
+        Ok(Store::open_existing(&self.path)?)
+    }
+
+    fn store(&self) -> PyResult<Option<Store>> {
+        self.read().map_err(raised)
+    }
+
+    /// A material of the file, or a built-in one.
+    fn find(&self, py: Python<'_>, name: &str) -> PyResult<MaterialRevision> {
+        py.detach(|| find_material(self.read()?.as_ref(), name, "")).map_err(raised)
     }
 
     pub(crate) fn database(&self) -> setup::Database {
@@ -51,36 +61,33 @@ impl Database {
         py: Python<'_>,
         name: &str,
         fit: &Fit,
-        origin: CurveOrigin,
-        material_class: &str,
-        description: Option<String>,
+        given: Details,
     ) -> PyResult<Vec<String>> {
         let slug = name.parse::<Slug>();
         let slug = slug.map_err(|error| UsageError::new_err(error.to_string()))?;
-        let stored = py.detach(|| {
-            let CurveOrigin { kind, title, licence, instrument, frequency_hz, threshold_w } =
-                origin.clone();
-            let details = Details {
-                slug: Some(slug),
-                class: Some(material_class.to_owned()),
-                description,
-                kind,
-                source: title,
-                licence,
-                instrument,
-                frequency_hz,
-                threshold_w,
-                ..Details::default()
-            };
-            // A curve of a material has its origin there.
-            let origin = if fit.subject.found.is_some() { CurveOrigin::default() } else { origin };
-            let material = fit.subject.found.is_none().then(|| name.to_owned());
-            let storage = FitStorage { material, keep_render: false, origin };
-            let Fit { subject, result, fit_name, .. } = fit;
-            FittedMaterial { subject, result, fit_name, details, storage }.store(&self.database())
-        });
-        let StoredFit { material, revision, .. } = stored.map_err(raised)?;
-        Ok(vec![format!("{material}@{revision}")])
+        let own = fit.measured.as_ref();
+        let details = Details {
+            slug: Some(slug),
+            kind: given.kind.or(own.map(|one| one.kind)),
+            instrument: given.instrument.or_else(|| own.map(|one| one.name.clone())),
+            frequency_hz: given.frequency_hz.or(own.map(|one| one.frequency_hz)),
+            threshold_w: given.threshold_w.or(own.map(|one| one.threshold_w)),
+            ..given
+        };
+        let Details { kind, source, licence, instrument, frequency_hz, threshold_w, .. } =
+            details.clone();
+        let origin =
+            CurveOrigin { kind, title: source, licence, instrument, frequency_hz, threshold_w };
+        let storage = FitStorage { material: Some(name.to_owned()), keep_render: false, origin };
+        let Fit { subject, result, fit_name, .. } = fit;
+        let fitted = FittedMaterial { subject, result, fit_name, details, storage };
+        let stored = py.detach(|| fitted.store(&self.database())).map_err(raised)?;
+        if stored.curve_is_open {
+            let sentence =
+                "the fit leaves the curve open somewhere: scenes go on rendering what they did";
+            warn(py, &[sentence.to_owned()])?;
+        }
+        Ok(vec![format!("{}@{}", stored.material, stored.revision)])
     }
 }
 
@@ -135,20 +142,9 @@ impl Database {
         store.holds(&slug).map_err(raised)
     }
 
-    /// A material by `NAME` or `NAME@REVISION`, from the file or built in.
+    /// A material by `NAME` or `NAME@REVISION`, from the file or built in. `in` and `len` are of the file alone.
     fn __getitem__(&self, py: Python<'_>, name: &str) -> PyResult<Material> {
-        match find_material(self.store()?.as_ref(), name, "") {
-            Ok(found) => Ok(Material::new(found)),
-            Err(error) => {
-                let raised = raised(error);
-                // A mapping raises KeyError for a key that it does not have.
-                Err(if raised.is_instance_of::<MaterialError>(py) {
-                    PyKeyError::new_err(raised.value(py).to_string())
-                } else {
-                    raised
-                })
-            }
-        }
+        self.find(py, name).map(Material::new)
     }
 
     /// Adds built-in materials by name, and those of files or folders: `material.toml`, or a format of others. Or a fit
@@ -161,12 +157,15 @@ impl Database {
     ///     Built-in materials; or the name of one material and its `Fit`.
     /// files : list of path, optional
     ///     Files, or folders with a `material.toml` each.
+    /// name : str, optional
+    ///     Name of the material of a file of others.
     /// source, licence : str, optional
-    ///     Of the curve of a fit: who measured it, when and how, and the SPDX expression of its licence.
-    /// kind : str, default "measured"
-    ///     How the curve came to be: `measured`, `literature`, `modelled` or `synthetic`.
+    ///     Of the curve of a fit or of a file of others: who measured it, when and how, and the SPDX expression of its licence.
+    /// kind : str, optional
+    ///     How the curve came to be: `measured`, `literature`, `modelled` or `synthetic`. That of `measure` is `measured`
+    ///     unless stated, and `synthetic` of a `Scan`.
     /// material_class, description : str, optional
-    ///     Of a new material.
+    ///     Of a new material; the class of one of a fit is `sample` unless stated.
     /// instrument : str, optional
     /// frequency_ghz, threshold_dbm : float, optional
     ///     What the curve was measured with; that of the scene that it was measured in unless stated.
@@ -175,8 +174,18 @@ impl Database {
     /// -------
     /// list of str
     ///     `NAME@REVISION` of each.
-    #[pyo3(signature = (*names, files = Vec::new(), source = None, licence = None, kind = "measured",
-                        material_class = "sample", description = None, instrument = None, frequency_ghz = None,
+    ///
+    /// Raises
+    /// ------
+    /// matdb.Error
+    ///     What an entry lacks, and details for which there is no place. Nothing is stored then.
+    ///
+    /// Warns
+    /// -----
+    /// UserWarning
+    ///     What is not known of a material, and what may be a slip.
+    #[pyo3(signature = (*names, files = Vec::new(), name = None, source = None, licence = None, kind = None,
+                        material_class = None, description = None, instrument = None, frequency_ghz = None,
                         threshold_dbm = None))]
     #[expect(clippy::too_many_arguments, reason = "each is a keyword in Python")]
     fn add(
@@ -184,44 +193,53 @@ impl Database {
         py: Python<'_>,
         names: &Bound<'_, PyTuple>,
         files: Vec<PathBuf>,
+        name: Option<String>,
         source: Option<String>,
         licence: Option<String>,
-        kind: &str,
-        material_class: &str,
+        kind: Option<&str>,
+        material_class: Option<String>,
         description: Option<String>,
         instrument: Option<String>,
         frequency_ghz: Option<f64>,
         threshold_dbm: Option<f64>,
     ) -> PyResult<Vec<String>> {
+        let wrong = |error| UsageError::new_err(format!("kind: {error}"));
+        let kind = kind.map(|kind| serde_json::from_value(json!(kind))).transpose();
+        let slug = name.as_deref().map(str::parse::<Slug>).transpose();
+        let given = Details {
+            slug: slug.map_err(|error| UsageError::new_err(error.to_string()))?,
+            class: material_class,
+            description,
+            kind: kind.map_err(wrong)?,
+            source,
+            licence,
+            instrument,
+            frequency_hz: frequency_ghz.map(|ghz| ghz * 1e9),
+            threshold_w: threshold_dbm.map(watts_from_dbm),
+            ..Details::default()
+        };
         if let Ok((name, fit)) = names.extract::<(String, Bound<'_, Fit>)>() {
-            let fit = fit.get();
-            let own = fit.instrument.as_ref();
-            let wrong = |error| UsageError::new_err(format!("kind: {error}"));
-            let kind: SourceKind = serde_json::from_value(json!(kind)).map_err(wrong)?;
-            let origin = CurveOrigin {
-                kind: Some(kind),
-                title: source,
-                licence,
-                instrument: instrument.or_else(|| own.map(|one| one.name.clone())),
-                frequency_hz: frequency_ghz
-                    .map(|ghz| ghz * 1e9)
-                    .or(own.map(|one| one.frequency_hz)),
-                threshold_w: threshold_dbm.map(watts_from_dbm).or(own.map(|one| one.threshold_w)),
-            };
-            return self.add_fit(py, &name, fit, origin, material_class, description);
+            if !files.is_empty() || given.slug.is_some() {
+                let problem =
+                    "a fit is added alone, under the name before it; leave files and name out";
+                return Err(UsageError::new_err(problem));
+            }
+            return self.add_fit(py, &name, fit.get(), given);
+        }
+        if files.is_empty() && given != Details::default() {
+            let problem = "details belong to a file or a fit; give one, or leave the details out";
+            return Err(UsageError::new_err(problem));
         }
         let names: Vec<String> = names.extract()?;
-        py.detach(|| {
+        let stored = py.detach(|| {
             let database = self.database();
-            let given = Details::default();
             let new = NewMaterials::read(&names, &files, &given, &database)?;
-            let added = new.store(&database)?;
-            Ok(added
-                .iter()
-                .map(|added| format!("{}@{}", added.slug, added.added.revision()))
-                .collect())
-        })
-        .map_err(raised::<Error>)
+            Ok((new.store(&database)?, new.notices))
+        });
+        let (added, mut notices) = stored.map_err(raised::<Error>)?;
+        notices.extend(added.iter().flat_map(|one| one.notice.clone()));
+        warn(py, &notices)?;
+        Ok(added.iter().map(|one| format!("{}@{}", one.slug, one.added.revision())).collect())
     }
 
     /// The materials with these words, the best first: a dictionary each, as `matdb search --json` prints.
@@ -254,8 +272,7 @@ impl Database {
         if let Some(wrong) = angles_deg.iter().find(|angle| !(0.0..90.0).contains(*angle)) {
             return Err(UsageError::new_err(format!("{wrong}° is not from 0 to below 90")));
         }
-        let store = self.store()?;
-        let found = find_material(store.as_ref(), name, "").map_err(raised)?;
+        let found = self.find(py, name)?;
         let MaterialRevision { material, revision } = &found;
         let prediction = py.detach(|| Prediction::new(material, *revision, &angles_deg));
         to_python(py, &prediction.map_err(raised)?)
@@ -263,9 +280,7 @@ impl Database {
 
     /// What differs between two materials or revisions, as `matdb diff --json` prints it.
     fn diff<'py>(&self, py: Python<'py>, before: &str, after: &str) -> PyResult<Bound<'py, PyAny>> {
-        let store = self.store()?;
-        let of = |name| find_material(store.as_ref(), name, "").map(|found| found.material);
-        let (before, after) = (of(before).map_err(raised)?, of(after).map_err(raised)?);
+        let (before, after) = (self.find(py, before)?.material, self.find(py, after)?.material);
         to_python(py, &py.detach(|| Diff::new(&before, &after)))
     }
 
@@ -334,20 +349,22 @@ impl Database {
     #[pyo3(signature = (name, reason, *, superseded_by = None))]
     fn withdraw(
         &self,
+        py: Python<'_>,
         name: String,
         reason: String,
         superseded_by: Option<String>,
     ) -> PyResult<u32> {
         let withdrawal = Withdrawal { name, reason, superseded_by };
-        let (_, revision) = withdrawal.store(&self.database()).map_err(raised)?;
+        let done = py.detach(|| withdrawal.store(&self.database()));
+        let (_, revision) = done.map_err(raised)?;
         Ok(revision)
     }
 
-    /// Removes materials with all their revisions. Returns the number of revisions by name.
+    /// Removes materials with all their revisions. Returns `slug` and number of `revisions` of each.
     #[pyo3(signature = (*names))]
     fn remove<'py>(&self, py: Python<'py>, names: Vec<String>) -> PyResult<Bound<'py, PyAny>> {
-        let removed = remove_materials(&names, &self.database()).map_err(raised)?;
-        to_python(py, &removed)
+        let removed = py.detach(|| remove_materials(&names, &self.database()));
+        to_python(py, &removed.map_err(raised)?)
     }
 
     /// Writes a material to a file of another format. Returns the files and what the format cannot hold, as
@@ -379,9 +396,8 @@ impl Database {
             "mitsuba" => Format::Mitsuba,
             "sionna" => Format::Sionna,
             other => {
-                let known = "csv, universal-brdf, open-material, mitsuba and sionna";
-                let problem = format!("there is no format `{other}`; there are {known}");
-                return Err(PyValueError::new_err(problem));
+                let known = "csv, universal-brdf, open-material, mitsuba or sionna";
+                return Err(no_choice("format", other, known));
             }
         };
         let request = ExportRequest { material: name, format, curve, output: &path };
@@ -452,7 +468,7 @@ impl Database {
     }
 
     /// Verifies the whole database and makes its fits again, as `matdb check --json` prints it. What is wrong is in
-    /// `findings`.
+    /// `findings`. Ctrl-C ends it, but for a repair.
     ///
     /// Parameters
     /// ----------
@@ -461,7 +477,13 @@ impl Database {
     #[pyo3(signature = (*, repair = false))]
     fn check<'py>(&self, py: Python<'py>, repair: bool) -> PyResult<Bound<'py, PyAny>> {
         let check = DatabaseCheck { repair };
-        let report: Result<CheckReport, _> = py.detach(|| check.run(&self.database(), &mut |_| ()));
+        let report: Result<CheckReport, _> = interruptible(py, |stop| {
+            check.run(&self.database(), &mut |_| {
+                if !repair {
+                    stop.check()
+                }
+            })
+        })?;
         to_python(py, &report.map_err(raised)?)
     }
 

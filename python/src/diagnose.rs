@@ -7,8 +7,8 @@ use matdb::diagnose::Report;
 use matdb::effects::{Effect, find};
 use matdb::error::Error;
 use matdb::files::{folder_of, write_all};
-use matdb::scene::read_text;
-use matdb::setup;
+use matdb::material::Input;
+use matdb::setup::{self, ReadyScene};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use serde_json::{Value, json};
@@ -23,11 +23,13 @@ use crate::scene::{Scene, SceneLike};
 /// Name and bytes of a file.
 type File = (String, Vec<u8>);
 
-/// What was diagnosed: a cloud and the scene that was measured.
+/// What was diagnosed, as it was then: a cloud, and the scene that was measured with its materials.
 struct Subject {
-    cloud: CloudLike,
-    scene: Py<Scene>,
-    database: Option<setup::Database>,
+    cloud: PathBuf,
+    ready: ReadyScene,
+    scene_text: String,
+    /// Names and hashes of cloud and scene.
+    given: Vec<Input>,
     /// Those to try; all where there are none.
     effects: Vec<&'static dyn Effect>,
     seed: u64,
@@ -46,7 +48,7 @@ pub(crate) struct Diagnosis {
 ///
 /// Parameters
 /// ----------
-/// cloud : Cloud, str or os.PathLike
+/// cloud : Cloud, Scan, str or os.PathLike
 ///     The measured cloud, with a row of each detection.
 /// scene : Scene, str or os.PathLike
 ///     The scene that was measured.
@@ -64,7 +66,7 @@ pub(crate) struct Diagnosis {
 ///
 /// Raises
 /// ------
-/// matdb.Error
+/// matdb.DiagnoseError
 ///     Too few data, or data that are not of this scene.
 #[pyfunction]
 #[pyo3(signature = (cloud, scene, *, db = None, effects = Vec::new(), seed = 0, controls = true))]
@@ -83,32 +85,42 @@ pub(crate) fn diagnose(
         find(name).ok_or_else(unknown)
     });
     let effects = effects.collect::<PyResult<Vec<_>>>()?;
-    let subject = Subject { cloud, scene, database, effects, seed, controls };
     let answer = interruptible(py, |stop| {
-        subject.check(Path::new("."), |checked| {
-            let clouds = checked.read_clouds(|_, _| subject.cloud.read())?;
-            let report = checked.diagnose(&clouds, &|_| stop.check())?;
-            let record = publication(checked, &report, &checked.notices(), |publication| {
-                Ok(json!(publication.report().record()))
-            })?;
-            Ok((report, record))
-        })
+        let subject =
+            Subject::new(&cloud, scene.get(), database.as_ref(), effects, seed, controls)?;
+        let checked = subject.check(Path::new(""))?;
+        let clouds = checked.read_clouds(|_, _| Ok(cloud.read()?.into_owned()))?;
+        let found = checked.diagnose(&clouds, &|_| stop.check())?;
+        let notices = checked.notices();
+        let record = json!(publication(&checked, &found, &notices).report().record());
+        drop(checked);
+        Ok(Diagnosis { subject, found, record })
     })?;
-    let (found, record) = answer.map_err(raised::<Error>)?;
-    Ok(Diagnosis { subject, found, record })
+    answer.map_err(raised::<Error>)
 }
 
 impl Subject {
-    /// Checks the request, with its report in a folder, and hands it on.
-    fn check<Done>(
-        &self,
-        folder: &Path,
-        done: impl FnOnce(&CheckedRequest) -> Result<Done, Error>,
-    ) -> Result<Done, Error> {
-        let scene = self.scene.get();
+    fn new(
+        cloud: &CloudLike,
+        scene: &Scene,
+        database: Option<&setup::Database>,
+        effects: Vec<&'static dyn Effect>,
+        seed: u64,
+        controls: bool,
+    ) -> Result<Subject, Error> {
+        let store = database.map(setup::Database::read).transpose()?.flatten();
+        let ready = ReadyScene::new(scene.scene().clone(), scene.path(), store.as_ref())?;
+        let scene_text = scene.own_text().to_owned();
+        let given = vec![cloud.input()?, input(scene.path(), scene_text.as_bytes())];
+        let cloud = cloud.path().to_owned();
+        Ok(Subject { cloud, ready, scene_text, given, effects, seed, controls })
+    }
+
+    /// The request, with its report in a folder.
+    fn check<'a>(&'a self, folder: &'a Path) -> Result<CheckedRequest<'a>, Error> {
         let request = CloudRequest {
-            cloud: self.cloud.path(),
-            scene: scene.path(),
+            cloud: &self.cloud,
+            scene: &self.ready.path,
             further: &[],
             receiver: None,
             effects: &self.effects,
@@ -118,38 +130,29 @@ impl Subject {
             folder,
             add: false,
         };
-        let store = self.database.as_ref().map(|database| database.read()).transpose()?.flatten();
-        let text = scene.own_text().to_owned();
-        let is_file = read_text(scene.path()).is_ok_and(|file| file == text);
-        let mut checked =
-            request.check_scene(scene.scene().clone(), text.clone(), store.as_ref())?;
-        if !(self.cloud.is_file() && is_file) {
-            checked.given = vec![self.cloud.input()?, input(scene.path(), text.as_bytes())];
-        }
-        done(&checked)
+        let checked = request.check_ready(self.ready.clone(), self.scene_text.clone(), None)?;
+        Ok(CheckedRequest { given: self.given.clone(), ..checked })
     }
 }
 
-/// Hands on the files and words of a diagnosis.
-fn publication<Done>(
-    checked: &CheckedRequest,
-    report: &Report,
-    notices: &[String],
-    done: impl FnOnce(&Publication) -> Result<Done, Error>,
-) -> Result<Done, Error> {
+/// The files and words of a diagnosis.
+fn publication<'a>(
+    checked: &'a CheckedRequest,
+    report: &'a Report,
+    notices: &'a [String],
+) -> Publication<'a> {
     let words = ["matdb".to_owned(), "matdb diagnose".to_owned()];
-    done(&Publication::new(checked, report, notices, words))
+    Publication::new(checked, report, notices, words)
 }
 
 impl Diagnosis {
     /// The files of its report, for a folder, and what an earlier one left there.
     fn files(&self, folder: &Path) -> Result<(Vec<File>, Earlier), Error> {
-        self.subject.check(folder, |checked| {
-            publication(checked, &self.found, &checked.notices(), |publication| {
-                let earlier = Earlier::in_folder(folder, &checked.request.inputs());
-                Ok((publication.files()?, earlier))
-            })
-        })
+        let checked = self.subject.check(folder)?;
+        checked.check_output()?;
+        let notices = checked.notices();
+        let files = publication(&checked, &self.found, &notices).files()?;
+        Ok((files, Earlier::in_folder(folder, &checked.request.inputs())))
     }
 
     fn value<'py>(&self, py: Python<'py>, path: &str) -> PyResult<Bound<'py, PyAny>> {
@@ -188,14 +191,14 @@ impl Diagnosis {
         to_python(py, &self.record)
     }
 
-    /// Writes the report as one page, `report.html` for a person.
+    /// Writes the report for a person as one page that stands alone.
     fn report(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let written = py.detach(|| {
-            let (files, _) = self.files(folder_of(&path))?;
-            let page = files.into_iter().find(|(name, _)| name == "report.html");
+            let checked = self.subject.check(folder_of(&path))?;
+            let notices = checked.notices();
+            let page = publication(&checked, &self.found, &notices).page_alone()?;
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            let pages: Vec<_> = page.into_iter().map(|(_, bytes)| (name.clone(), bytes)).collect();
-            Ok(write_all(folder_of(&path), &pages)?)
+            Ok(write_all(folder_of(&path), &[(name, page)])?)
         });
         written.map_err(raised::<Error>)
     }

@@ -6,13 +6,13 @@ use matdb::adopt::{FitMethod, FitOutcome, FitRequest, FitSubject};
 use matdb::error::Error;
 use matdb::fit::FitResult;
 use matdb::setup;
-use matdb::units::watts_from_dbm;
+use matdb::units::{db_from_ratio, watts_from_dbm};
 use numpy::{PyArray1, PyArray2, PyArrayLike1};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::json;
 
+use crate::cloud::no_choice;
 use crate::database::Database;
 use crate::error::raised;
 use crate::json::to_python;
@@ -25,8 +25,8 @@ pub(crate) struct Fit {
     pub(crate) result: FitResult,
     pub(crate) subject: FitSubject,
     pub(crate) fit_name: String,
-    /// The radar of a curve that was measured here.
-    pub(crate) instrument: Option<Instrument>,
+    /// What a curve was measured with that was measured here.
+    pub(crate) measured: Option<Instrument>,
     notices: Vec<String>,
 }
 
@@ -68,11 +68,7 @@ impl Request<'_, '_> {
             "tls" => FitMethod::Tls,
             "tls-tail" => FitMethod::TlsTail,
             "mse" => FitMethod::Mse,
-            other => {
-                let known = "censored, tls, tls-tail and mse";
-                let problem = format!("there is no method `{other}`; there are {known}");
-                return Err(PyValueError::new_err(problem));
-            }
+            other => return Err(no_choice("method", other, "censored, tls, tls-tail or mse")),
         };
         let fixed = self.fixed.map_or(Ok(Vec::new()), |fixed| {
             let held = fixed.iter().map(|(path, value)| Ok((path.extract()?, value.extract()?)));
@@ -100,7 +96,7 @@ impl Request<'_, '_> {
                 seed: seed.unwrap_or(usual.seed),
                 ..usual
             };
-            let (checked, instrument) = match given {
+            let (checked, measured) = match given {
                 None => (request.check(store.as_ref())?, None),
                 Some((subject, instrument)) => {
                     (request.check_subject(subject, store.as_ref())?, Some(instrument))
@@ -109,7 +105,7 @@ impl Request<'_, '_> {
             let (notices, fit_name) = (checked.notices.clone(), checked.fit_name.clone());
             drop(store);
             let FitOutcome { subject, result, refusal, .. } = checked.run(&database)?;
-            let fit = Fit { result, subject, fit_name, instrument, notices };
+            let fit = Fit { result, subject, fit_name, measured, notices };
             refusal.map_or(Ok(fit), Err)
         });
         fitted.map_err(raised::<Error>)
@@ -127,7 +123,7 @@ impl Request<'_, '_> {
 /// model : str, optional
 ///     A model or a material, where the search starts; what the material renders, else `mixture`, unless stated.
 /// method : str, default "censored"
-///     `censored`, `tls`, `tls-tail` or `mse`.
+///     `censored`, `tls`, `tls-tail` (which takes the exponent of the tail as `fixed`) or `mse`.
 /// curve : str, optional
 ///     Curve of the material; the longest unless stated.
 /// fixed : dict of str to float, optional
@@ -202,6 +198,12 @@ impl Fit {
         slf.py().import("matdb._plots")?.call_method1("fit", (slf, ax))
     }
 
+    /// Whether each level of the curve is backscatter, and source and receiver in one direction: bool (n,).
+    #[getter]
+    fn is_retro<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
+        PyArray1::from_iter(py, self.subject.curve.observations.iter().map(|row| row.is_retro()))
+    }
+
     /// Angles of incidence of the curve, degrees: float64 (n,).
     #[getter]
     fn theta_deg<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
@@ -213,7 +215,7 @@ impl Fit {
     #[getter]
     fn levels_db<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let rows = self.subject.curve.observations.iter();
-        PyArray1::from_iter(py, rows.map(|row| row.sigma0.map_or(f64::NAN, |r| 10.0 * r.log10())))
+        PyArray1::from_iter(py, rows.map(|row| row.sigma0.map_or(f64::NAN, db_from_ratio)))
     }
 
     /// What limits the use of the fit, a sentence each: what the curve cannot tell apart, and bounds that were met.

@@ -34,7 +34,8 @@ mod _matdb {
     use crate::diagnose::{Diagnosis, diagnose};
     #[pymodule_export]
     use crate::error::{
-        Error, FileError, MaterialError, RenderError, SceneError, StoreError, UsageError,
+        CatalogueError, CloudError, DiagnoseError, Error, FileError, FitError, MaterialError,
+        RenderError, SceneError, StoreError, UsageError,
     };
     #[pymodule_export]
     use crate::fit::{Fit, fit};
@@ -49,6 +50,9 @@ mod _matdb {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        let error = module.getattr("Error")?;
+        error.setattr("file", module.py().None())?;
+        error.setattr("hint", module.py().None())?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -1,9 +1,8 @@
 //! A material.
 
-use std::f64::consts::PI;
-
 use matdb::brdf::{Brdf, Scattering};
 use matdb::setup::MaterialRevision;
+use matdb::units::db_from_ratio;
 use numpy::{PyArray1, PyArrayLike1};
 use pyo3::prelude::*;
 
@@ -28,12 +27,10 @@ pub(crate) fn sigma0_db<'py>(
     law: &Brdf,
     theta_deg: &PyArrayLike1<'py, f64, numpy::AllowTypeChange>,
 ) -> Bound<'py, PyArray1<f64>> {
-    let level_db = |theta_deg: &f64| {
-        let theta_rad = theta_deg.to_radians();
-        let retro_per_sr = law.retro_per_sr(theta_rad);
-        10.0 * (4.0 * PI * retro_per_sr * theta_rad.cos().powi(2)).log10()
-    };
-    PyArray1::from_iter(py, theta_deg.as_array().iter().map(level_db))
+    let angles_deg = theta_deg.as_array();
+    let levels_db =
+        angles_deg.iter().map(|theta_deg| db_from_ratio(law.sigma0(theta_deg.to_radians())));
+    PyArray1::from_iter(py, levels_db)
 }
 
 #[pymethods]

@@ -5,16 +5,17 @@ use std::path::{Path, PathBuf};
 use matdb::adopt::FitSubject;
 use matdb::error::Error;
 use matdb::files::write_all;
-use matdb::material::Observation;
+use matdb::material::{Observation, SourceKind};
 use matdb::measure::{Reduction, Registration, Start};
 use matdb::report::{MeasurementReport, MeasurementRequest};
 use matdb::setup::read_pose;
-use matdb::units::watts_from_dbm;
+use matdb::units::{db_from_ratio, watts_from_dbm};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::cloud::CloudLike;
+use crate::database::Database;
 use crate::error::raised;
 use crate::fit::{Fit, Request, What};
 use crate::json::to_python;
@@ -28,9 +29,10 @@ pub(crate) struct Measurement {
     instrument: Instrument,
 }
 
-/// The radar that a curve was measured with.
+/// What a curve was measured with.
 #[derive(Clone)]
 pub(crate) struct Instrument {
+    pub(crate) kind: SourceKind,
     pub(crate) name: String,
     pub(crate) frequency_hz: f64,
     pub(crate) threshold_w: f64,
@@ -40,8 +42,8 @@ pub(crate) struct Instrument {
 ///
 /// Parameters
 /// ----------
-/// cloud : Cloud, str or os.PathLike
-///     The cloud, or its file: `.ply`, `.csv`, `.xyz`, `.pcd`, `.las` or `.laz`.
+/// cloud : Cloud, Scan, str or os.PathLike
+///     The cloud, that of a rendering, or its file: `.ply`, `.csv`, `.xyz`, `.pcd`, `.las` or `.laz`.
 /// scene : Scene, str or os.PathLike
 ///     What was measured.
 /// region : str, optional
@@ -71,7 +73,7 @@ pub(crate) fn measure(
         };
         let request = MeasurementRequest {
             cloud_file: cloud.path(),
-            cloud: &cloud.read()?,
+            cloud: &*cloud.read()?,
             scene_file: scene.path(),
             scene: scene.scene(),
             registration: Registration { start, keep_given: true, ..Registration::default() },
@@ -80,6 +82,7 @@ pub(crate) fn measure(
         };
         let (name, radar) = (scene.scene().file.name.clone(), scene.scene().radar());
         let instrument = Instrument {
+            kind: if cloud.is_simulated() { SourceKind::Synthetic } else { SourceKind::Measured },
             name: radar.preset.clone(),
             frequency_hz: radar.centre_frequency_ghz * 1e9,
             threshold_w: watts_from_dbm(radar.threshold_dbm),
@@ -101,7 +104,7 @@ impl Measurement {
 
 /// A ratio in dB; NaN for none.
 fn level_db(ratio: Option<f64>) -> f64 {
-    ratio.map_or(f64::NAN, |ratio| 10.0 * ratio.log10())
+    ratio.map_or(f64::NAN, db_from_ratio)
 }
 
 #[pymethods]
@@ -125,13 +128,14 @@ impl Measurement {
     }
 
     /// Fits a scattering model to the curve, as `matdb.fit` does.
-    #[pyo3(signature = (model = None, *, method = "censored", fixed = None, looks = None, noise_dbm = None,
+    #[pyo3(signature = (model = None, *, db = None, method = "censored", fixed = None, looks = None, noise_dbm = None,
                         starts = None, seed = None))]
     #[expect(clippy::too_many_arguments, reason = "each is a keyword in Python")]
     fn fit(
         &self,
         py: Python<'_>,
         model: Option<&str>,
+        db: Option<&Database>,
         method: &str,
         fixed: Option<&Bound<'_, PyDict>>,
         looks: Option<f64>,
@@ -141,7 +145,7 @@ impl Measurement {
     ) -> PyResult<Fit> {
         let request = Request { model, method, curve: None, fixed, looks, noise_dbm, starts, seed };
         let subject = FitSubject::of_curve(self.report.reduced.curve.clone(), "curve");
-        request.run(py, What::Curve(Box::new(subject), self.instrument.clone()), None)
+        request.run(py, What::Curve(Box::new(subject), self.instrument.clone()), db)
     }
 
     /// The curve over the angle of incidence, on axes of matplotlib.
@@ -157,6 +161,12 @@ impl Measurement {
     #[getter]
     fn record<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         to_python(py, &self.report.record)
+    }
+
+    /// Where the target stands: rotation, shift and their deviations, as `record` has it.
+    #[getter]
+    fn pose<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.record(py)?.get_item("pose")
     }
 
     /// What a person should not overlook, a sentence each.

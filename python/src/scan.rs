@@ -2,21 +2,24 @@
 
 use std::path::PathBuf;
 
+use matdb::error::Error;
 use matdb::files::{folder_of, write_all};
 use matdb::formats::ply::{Column, Scalar, Table};
 use matdb::geometry::Raster;
+use matdb::geometry::raster::Channel;
 use matdb::render::{Echo, cloud_table};
 use matdb::report::{RenderFiles, RenderRequest, rendering_page};
 use matdb::setup::{ReadyScene, View as Received};
-use numpy::{PyArray1, PyArrayMethods};
-use pyo3::exceptions::PyKeyError;
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyDict};
+use pyo3::types::{PyBytes, PyDict, PyTuple};
 
+use crate::cloud::{Cloud, no_choice};
 use crate::database::Database;
 use crate::error::raised;
 use crate::interrupt::interruptible;
-use crate::scene::Scene;
+use crate::scene::{Scene, SceneLike};
 
 /// What one antenna received in one polarisation.
 #[pyclass(frozen, module = "matdb")]
@@ -27,22 +30,32 @@ pub(crate) struct View {
     cloud: Py<PyDict>,
     x_m: Py<PyArray1<f64>>,
     y_m: Py<PyArray1<f64>>,
+    /// x of the image's left edge and y of its lower one, m.
+    corner_m: [f64; 2],
+    /// Side of a pixel, m.
+    pixel_m: f64,
     threshold_w: f64,
 }
 
 /// A rendering of a scene.
 #[pyclass(frozen, module = "matdb")]
 pub(crate) struct Scan {
-    name: String,
+    scene: Py<Scene>,
     files: Vec<(String, Vec<u8>)>,
     /// The radar's own view first.
     views: Vec<(String, Py<View>)>,
-    chirps: usize,
     notices: Vec<String>,
-    /// What [`Scan::show`] draws: scene, names of its materials, cloud and image of the radar's own view.
-    scene: Py<Scene>,
+    /// Names of the scene's materials.
     materials: Vec<String>,
-    shown: Option<(Table, Raster)>,
+}
+
+/// What is known of a rendering before there are arrays.
+struct Rendered {
+    files: Vec<(String, Vec<u8>)>,
+    /// Name, cloud, image and threshold of each antenna.
+    views: Vec<(String, Table, Raster, f64)>,
+    notices: Vec<String>,
+    materials: Vec<String>,
 }
 
 /// A page that stands alone, for a browser or a notebook.
@@ -55,7 +68,7 @@ pub(crate) struct Page {
 ///
 /// Parameters
 /// ----------
-/// scene : Scene
+/// scene : Scene, str or os.PathLike
 /// db : Database, optional
 ///     Where its materials are looked for; without it, and for those that it does not have, the built-in ones.
 /// seed : int, optional
@@ -64,64 +77,77 @@ pub(crate) struct Page {
 /// Returns
 /// -------
 /// Scan
+///
+/// Raises
+/// ------
+/// matdb.MaterialError, matdb.RenderError
+///     Materials that are not known, and what cannot be rendered.
 #[pyfunction]
 #[pyo3(signature = (scene, *, db = None, seed = None))]
 pub(crate) fn render(
     py: Python<'_>,
-    scene: &Bound<'_, Scene>,
+    scene: SceneLike,
     db: Option<&Database>,
     seed: Option<u64>,
 ) -> PyResult<Scan> {
-    let with_seed = seed
-        .map(|seed| {
-            let changes = PyDict::new(py);
-            changes.set_item("seed", seed)?;
-            Bound::new(py, scene.get().with(py, &changes)?)
-        })
-        .transpose()?;
-    let own = with_seed.as_ref().unwrap_or(scene);
-    let scene = own.get();
-    let store = db.map_or(Ok(None), Database::store)?;
-    let ready =
-        ReadyScene::new(scene.scene.clone(), &scene.path, store.as_ref()).map_err(raised)?;
-    drop(store);
-    let request = RenderRequest::new(&ready);
-    let rendered = interruptible(py, |stop| request.render(&|_| stop.check()))?;
-    Scan::new(py, own, &ready, rendered.map_err(raised)?)
+    let mut scene = scene.scene(py)?;
+    if let Some(seed) = seed {
+        let changes = PyDict::new(py);
+        changes.set_item("seed", seed)?;
+        scene = Py::new(py, scene.get().with(py, &changes)?)?;
+    }
+    let rendered = interruptible(py, |stop| Rendered::new(scene.get(), db, &|| stop.check()))?;
+    Scan::new(py, scene, rendered.map_err(raised)?)
+}
+
+impl Rendered {
+    fn new(
+        scene: &Scene,
+        db: Option<&Database>,
+        check: &(dyn Fn() + Sync),
+    ) -> Result<Rendered, Error> {
+        let store = db.map_or(Ok(None), Database::read)?;
+        let ready = ReadyScene::new(scene.scene().clone(), scene.path(), store.as_ref())?;
+        drop(store);
+        let RenderFiles { views, images, record, files } =
+            RenderRequest::new(&ready).render(&|_| check())?;
+        let materials = record.material_names();
+        let mut named = Vec::new();
+        for (view, image) in std::iter::zip(&views, images) {
+            check();
+            let name = view.file_name("view", "");
+            let name = name.trim_end_matches('.').replacen("view", "radar", 1);
+            named.push((name, table(&ready, view, &materials), image, view.scan.threshold_w));
+        }
+        Ok(Rendered { files, views: named, notices: record.notices(), materials })
+    }
 }
 
 impl Scan {
-    fn new(
-        py: Python<'_>,
-        scene: &Bound<'_, Scene>,
-        ready: &ReadyScene,
-        rendered: RenderFiles<'_>,
-    ) -> PyResult<Scan> {
-        let (mut views, mut shown) = (Vec::new(), None);
-        for (view, image) in std::iter::zip(&rendered.views, rendered.images) {
-            let table = table(ready, view);
-            shown = shown.or_else(|| Some((table.clone(), image.clone())));
-            let name = view.file_name("view", "");
-            let name = name.trim_end_matches('.').replacen("view", "radar", 1);
-            views.push((name, Py::new(py, View::new(py, table, view.scan.threshold_w, image)?)?));
-        }
-        Ok(Scan {
-            name: ready.scene.file.name.clone(),
-            files: rendered.files,
-            views,
-            chirps: ready.scene.chirps.rays.len(),
-            notices: ready.notices(),
-            scene: scene.clone().unbind(),
-            materials: ready.materials.iter().map(|material| material.name.clone()).collect(),
-            shown,
-        })
+    fn new(py: Python<'_>, scene: Py<Scene>, rendered: Rendered) -> PyResult<Scan> {
+        let Rendered { files, views, notices, materials } = rendered;
+        let views = views.into_iter().map(|(name, table, image, threshold_w)| {
+            Ok((name, Py::new(py, View::new(py, table, threshold_w, image)?)?))
+        });
+        Ok(Scan { scene, files, views: views.collect::<PyResult<_>>()?, notices, materials })
     }
 
     fn radar<'a, 'py>(&'a self, py: Python<'py>) -> PyResult<&'a Bound<'py, View>> {
         let (_, view) = self.views.first().ok_or_else(|| PyKeyError::new_err("no view"))?;
         Ok(view.bind(py))
     }
+
+    /// What the radar measured, as points.
+    pub(crate) fn points(&self, py: Python<'_>) -> PyResult<Cloud> {
+        let mut columns = self.radar(py)?.get().table(py)?.columns;
+        columns.retain(|column| MEASURED.contains(&column.name.as_str()));
+        let columns = columns.into_iter().map(|column| (column.name, column.values));
+        Cloud::of_columns(columns.collect()).map_err(raised)
+    }
 }
+
+/// Columns of what is measured of a detection.
+const MEASURED: [&str; 6] = ["x", "y", "z", "power_dbm", "chirp", "range_m"];
 
 impl View {
     fn new(py: Python<'_>, table: Table, threshold_w: f64, raster: Raster) -> PyResult<View> {
@@ -143,13 +169,38 @@ impl View {
         }
         frozen(&x_m)?;
         frozen(&y_m)?;
+        let corner_m = [raster.x_min_m, raster.y_min_m];
         Ok(View {
             image: image.unbind(),
             cloud: cloud.unbind(),
             x_m: x_m.unbind(),
             y_m: y_m.unbind(),
+            corner_m,
+            pixel_m: raster.pixel_m,
             threshold_w,
         })
+    }
+
+    /// The cloud as numbers.
+    fn table(&self, py: Python<'_>) -> PyResult<Table> {
+        let columns = self.cloud.bind(py).iter().map(|(name, values)| {
+            let values = values.call_method1("astype", ("float64",))?;
+            let values = values.cast_into::<PyArray1<f64>>().map_err(PyErr::from)?.to_vec()?;
+            Ok(Column { name: name.extract()?, scalar: Scalar::Double, values })
+        });
+        Ok(Table { comments: Vec::new(), columns: columns.collect::<PyResult<_>>()? })
+    }
+
+    /// The power image.
+    fn raster(&self, py: Python<'_>) -> PyResult<Raster> {
+        let [x_min_m, y_min_m] = self.corner_m;
+        let power = self.channel(py, "power_dbm")?.cast_into::<PyArray2<f32>>()?;
+        let channel = Channel { name: "power_dbm".to_owned(), values: power.to_vec()? };
+        let &[height, width] = power.shape() else {
+            return Err(PyValueError::new_err("an image has rows and columns"));
+        };
+        let pixel_m = self.pixel_m;
+        Ok(Raster { width, height, x_min_m, y_min_m, pixel_m, channels: vec![channel] })
     }
 
     fn channel<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
@@ -162,11 +213,10 @@ impl View {
 }
 
 /// The detections of a view with every column.
-fn table(ready: &ReadyScene, view: &Received<'_>) -> Table {
+fn table(ready: &ReadyScene, view: &Received<'_>, materials: &[String]) -> Table {
     let regions: Vec<&str> =
         ready.scene.target.regions.iter().map(|region| region.name.as_str()).collect();
-    let materials: Vec<&str> =
-        ready.materials.iter().map(|material| material.name.as_str()).collect();
+    let materials: Vec<&str> = materials.iter().map(String::as_str).collect();
     let detections: Vec<&Echo> = view.scan.detections().collect();
     cloud_table(&detections, &ready.material_of_region, &regions, &materials, true)
 }
@@ -182,10 +232,9 @@ fn array<'py>(py: Python<'py>, column: Column) -> PyResult<Bound<'py, PyAny>> {
     let values = column.values;
     Ok(match column.scalar {
         Scalar::Double => PyArray1::from_vec(py, values).into_any(),
-        Scalar::Float => {
-            PyArray1::from_iter(py, values.iter().map(|value| *value as f32)).into_any()
-        }
-        _ => PyArray1::from_iter(py, values.iter().map(|value| *value as i64)).into_any(),
+        Scalar::Float => PyArray1::from_iter(py, values.iter().map(|one| *one as f32)).into_any(),
+        Scalar::UInt => PyArray1::from_iter(py, values.iter().map(|one| *one as u32)).into_any(),
+        _ => PyArray1::from_iter(py, values.iter().map(|one| *one as i32)).into_any(),
     })
 }
 
@@ -250,6 +299,26 @@ impl View {
     fn __len__(&self, py: Python<'_>) -> PyResult<usize> {
         self.column(py, "x")?.len()
     }
+
+    /// A view of its parts, as pickle makes one.
+    #[staticmethod]
+    fn _of_parts(
+        image: Py<PyDict>,
+        cloud: Py<PyDict>,
+        axes: (Py<PyArray1<f64>>, Py<PyArray1<f64>>),
+        corner_m: [f64; 2],
+        pixel_m: f64,
+        threshold_w: f64,
+    ) -> View {
+        let (x_m, y_m) = axes;
+        View { image, cloud, x_m, y_m, corner_m, pixel_m, threshold_w }
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let View { image, cloud, x_m, y_m, corner_m, pixel_m, threshold_w } = slf.get();
+        let parts = (image, cloud, (x_m, y_m), *corner_m, *pixel_m, *threshold_w);
+        (slf.get_type().getattr("_of_parts")?, parts).into_pyobject(slf.py())
+    }
 }
 
 #[pymethods]
@@ -257,7 +326,13 @@ impl Scan {
     /// Name of the scene.
     #[getter]
     fn name(&self) -> &str {
-        &self.name
+        self.scene.get().name()
+    }
+
+    /// The scene, with the seed of this rendering.
+    #[getter]
+    fn scene(&self) -> &Py<Scene> {
+        &self.scene
     }
 
     /// What each antenna received, by its name: `radar` is the radar's own, `cross-radar` its cross-polar channel,
@@ -344,13 +419,23 @@ impl Scan {
     }
 
     /// The detections in three dimensions, with target, radar and image, as a page. A notebook shows it.
-    fn show(&self, py: Python<'_>) -> PyResult<Page> {
-        let Some((cloud, image)) = &self.shown else { return Err(PyKeyError::new_err("no view")) };
+    ///
+    /// Parameters
+    /// ----------
+    /// view : str, default "radar"
+    ///     Name of one of `views`.
+    #[pyo3(signature = (*, view = "radar"))]
+    fn show(&self, py: Python<'_>, view: &str) -> PyResult<Page> {
+        let named = self.views.iter().find(|(name, _)| name == view);
+        let Some((_, view)) = named else {
+            let names: Vec<&str> = self.views.iter().map(|(name, _)| name.as_str()).collect();
+            return Err(no_choice("view", view, &names.join(", ")));
+        };
+        let (cloud, image) = (view.get().table(py)?, view.get().raster(py)?);
         let materials: Vec<&str> = self.materials.iter().map(String::as_str).collect();
-        let scene = &self.scene.get().scene;
-        let bytes =
-            py.detach(|| rendering_page(scene, cloud, image, &materials)).map_err(raised)?;
-        Ok(Page { html: String::from_utf8(bytes)? })
+        let scene = self.scene.get().scene();
+        let bytes = py.detach(|| rendering_page(scene, &cloud, &image, &materials));
+        Ok(Page { html: String::from_utf8(bytes.map_err(raised)?)? })
     }
 
     /// The power image, on axes of matplotlib.
@@ -369,7 +454,29 @@ impl Scan {
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         let detections = self.radar(py)?.get().__len__(py)?;
-        Ok(format!("<matdb.Scan {}: {detections} detections of {} chirps>", self.name, self.chirps))
+        let chirps = self.scene.get().chirps();
+        Ok(format!("<matdb.Scan {}: {detections} detections of {chirps} chirps>", self.name()))
+    }
+
+    /// A scan of its parts, as pickle makes one.
+    #[staticmethod]
+    fn _of_parts(
+        scene: Py<Scene>,
+        files: Vec<(String, Bound<'_, PyBytes>)>,
+        views: Vec<(String, Py<View>)>,
+        notices: Vec<String>,
+        materials: Vec<String>,
+    ) -> Scan {
+        let files = files.into_iter().map(|(name, bytes)| (name, bytes.as_bytes().to_vec()));
+        Scan { scene, files: files.collect(), views, notices, materials }
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let (py, Scan { scene, files, views, notices, materials }) = (slf.py(), slf.get());
+        let files = files.iter().map(|(name, bytes)| (name, PyBytes::new(py, bytes)));
+        let views = views.iter().map(|(name, view)| (name, view));
+        let parts = (scene, Vec::from_iter(files), Vec::from_iter(views), notices, materials);
+        (slf.get_type().getattr("_of_parts")?, parts).into_pyobject(py)
     }
 }
 

@@ -1,29 +1,68 @@
 //! A scene.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use matdb::scene::{self, SceneFile, read_text};
+use glam::DVec3;
+use matdb::files::{folder_of, write_all};
+use matdb::formats::ply::write_mesh;
+use matdb::geometry::Mesh;
+use matdb::scene::{self, GivenMeshes, SceneFile, read_text};
+use numpy::{AllowTypeChange, PyArray1, PyArrayLike2, PyArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyString};
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyString, PyTuple};
+use toml::{Table, Value};
 
 use crate::error::{UsageError, raised};
 use crate::json::to_python;
 
 /// Radar, scan and target. It never changes; `replace` makes another.
+///
+/// Parameters
+/// ----------
+/// meshes : dict of str to mesh
+///     Meshes in m by name: `(vertices, facets)` of shapes (n, 3) and (k, 3), a mesh of trimesh or of Open3D, or the name of a
+///     file or a built-in mesh. Or a dict with such a `mesh` and the other keys of `[[mesh]]`, as in `{"mesh": head,
+///     "translation_m": [0, 1.1, 0]}`.
+/// materials : str or dict of str to str, optional
+///     The material of all meshes, or of each by its name. Without it `region` says what is made of what.
+/// name : str, optional
+/// **tables
+///     Everything else that a scene file has: `seed=7`, `radar={"scan": {...}}`, `spot={"rays": 64}`, `region=[...]`.
+///
+/// Raises
+/// ------
+/// matdb.SceneError
+///     What the file of such a scene would be refused for.
 #[pyclass(frozen, module = "matdb")]
 pub(crate) struct Scene {
     /// The scene file's text, with what was replaced.
     text: String,
-    pub(crate) path: PathBuf,
-    pub(crate) scene: scene::Scene,
+    path: PathBuf,
+    scene: scene::Scene,
+    /// Meshes that are in no file.
+    given: Arc<GivenMeshes>,
 }
 
+/// Where the file of a scene would be that is in no file.
+const NO_FILE: &str = "scene.toml";
+
 impl Scene {
-    fn new(text: String, path: &Path) -> Result<Scene, matdb::error::Error> {
+    fn of_text(
+        text: String,
+        path: &Path,
+        given: Arc<GivenMeshes>,
+    ) -> Result<Scene, matdb::error::Error> {
         let at = |error| scene::SceneError::Format { file: path.to_owned(), error };
-        let scene = scene::Scene::resolve(SceneFile::parse(&text).map_err(at)?, path)?;
-        Ok(Scene { text, path: path.to_owned(), scene })
+        let file = SceneFile::parse(&text).map_err(at)?;
+        let scene = scene::Scene::resolve_given(file, path, &given)?;
+        Ok(Scene { text, path: path.to_owned(), scene, given })
+    }
+
+    fn table(&self) -> PyResult<Table> {
+        let unreadable = |error: toml::de::Error| UsageError::new_err(error.to_string());
+        self.text.parse().map_err(unreadable)
     }
 
     pub(crate) fn path(&self) -> &Path {
@@ -40,22 +79,40 @@ impl Scene {
 
     /// This scene with other values: `radar__spot__rays` stands for `rays` under `[radar.spot]`.
     pub(crate) fn with(&self, py: Python<'_>, changes: &Bound<'_, PyDict>) -> PyResult<Scene> {
-        let unreadable = |error: toml::de::Error| UsageError::new_err(error.to_string());
-        let mut table: toml::Table = self.text.parse().map_err(unreadable)?;
+        let mut table = self.table()?;
         for (key, value) in changes {
             let key: String = key.extract()?;
             set(&mut table, &key, toml_value(&key, &value)?)?;
         }
-        let text = table.to_string();
-        py.detach(|| Scene::new(text, &self.path)).map_err(raised)
+        let (text, given) = (table.to_string(), self.given.clone());
+        py.detach(|| Scene::of_text(text, &self.path, given)).map_err(raised)
+    }
+
+    pub(crate) fn name(&self) -> &str {
+        &self.scene.file.name
+    }
+
+    pub(crate) fn chirps(&self) -> usize {
+        self.scene.chirps.rays.len()
     }
 }
 
 /// A scene as an argument: itself, or its file.
-#[derive(FromPyObject)]
 pub(crate) enum SceneLike {
     Scene(Py<Scene>),
     File(PathBuf),
+}
+
+impl<'py> FromPyObject<'_, 'py> for SceneLike {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<SceneLike> {
+        if let Ok(scene) = given.cast::<Scene>() {
+            return Ok(SceneLike::Scene(scene.to_owned().unbind()));
+        }
+        let given = given.extract().map(SceneLike::File);
+        given.map_err(|_| PyTypeError::new_err("give a matdb.Scene, or the path of a scene file"))
+    }
 }
 
 impl SceneLike {
@@ -73,29 +130,70 @@ impl SceneLike {
 /// ----------
 /// path : str or os.PathLike
 ///     A scene file, or `builtin:NAME`.
+///
+/// Raises
+/// ------
+/// matdb.SceneError
+///     A file that is not there, or is no scene.
 #[pyfunction]
 pub(crate) fn load_scene(py: Python<'_>, path: PathBuf) -> PyResult<Scene> {
-    py.detach(|| Scene::new(read_text(&path)?, &path)).map_err(raised::<matdb::error::Error>)
+    let load = || Scene::of_text(read_text(&path)?, &path, Arc::default());
+    py.detach(load).map_err(raised::<matdb::error::Error>)
 }
 
 #[pymethods]
 impl Scene {
+    #[new]
+    #[pyo3(signature = (*, meshes, materials = None, name = None, **tables))]
+    fn new(
+        py: Python<'_>,
+        meshes: &Bound<'_, PyDict>,
+        materials: Option<&Bound<'_, PyAny>>,
+        name: Option<&str>,
+        tables: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Scene> {
+        let mut table = Table::new();
+        for (key, value) in tables.into_iter().flatten() {
+            let key: String = key.extract()?;
+            set(&mut table, &key, toml_value(&key, &value)?)?;
+        }
+        if let Some(name) = name {
+            table.insert("name".to_owned(), name.into());
+        }
+        let (mut entries, mut regions, mut given) = (Vec::new(), Vec::new(), GivenMeshes::new());
+        for (name, mesh) in meshes {
+            let name: String = name.extract()?;
+            entries.push(Value::Table(mesh_entry(&name, &mesh, &mut given)?));
+            if let Some(materials) = materials {
+                regions.push(Value::Table(region_of(&name, materials)?));
+            }
+        }
+        table.insert("mesh".to_owned(), entries.into());
+        if materials.is_some() && table.insert("region".to_owned(), regions.into()).is_some() {
+            return Err(UsageError::new_err(
+                "both materials and region are given; give one of them",
+            ));
+        }
+        let (text, given) = (table.to_string(), Arc::new(given));
+        py.detach(|| Scene::of_text(text, Path::new(NO_FILE), given)).map_err(raised)
+    }
+
     /// A scene of a text of a scene file. Relative paths in it start from the folder of `path`.
     #[staticmethod]
     fn from_text(py: Python<'_>, text: String, path: PathBuf) -> PyResult<Scene> {
-        py.detach(|| Scene::new(text, &path)).map_err(raised)
+        py.detach(|| Scene::of_text(text, &path, Arc::default())).map_err(raised)
     }
 
     /// Its name.
-    #[getter]
-    fn name(&self) -> &str {
-        &self.scene.file.name
+    #[getter("name")]
+    fn name_in_python(&self) -> &str {
+        self.name()
     }
 
     /// Number of chirps of its scan.
-    #[getter]
-    fn chirps(&self) -> usize {
-        self.scene.chirps.rays.len()
+    #[getter("chirps")]
+    fn chirps_in_python(&self) -> usize {
+        self.chirps()
     }
 
     /// Names of its regions.
@@ -126,26 +224,154 @@ impl Scene {
         format!("<matdb.Scene {}: {} chirps, {facets} facets>", self.name(), self.chirps())
     }
 
-    fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<(Py<PyAny>, (String, PathBuf))> {
-        let scene = slf.get();
-        let make = slf.py().import("matdb")?.getattr("Scene")?.getattr("from_text")?;
-        Ok((make.unbind(), (scene.text.clone(), scene.path.clone())))
+    /// Writes its file, with the meshes that are in no file beside it as PLY.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let mut table = self.table()?;
+        let meshes = table.get_mut("mesh").and_then(Value::as_array_mut);
+        let mut files = Vec::new();
+        for (number, entry) in meshes.into_iter().flatten().enumerate() {
+            let named = entry
+                .get("file")
+                .and_then(Value::as_str)
+                .and_then(|file| file.strip_prefix("given:"));
+            if let Some(mesh) = named.and_then(|name| self.given.get(name)) {
+                let file = format!("mesh-{number}.ply");
+                files.push((file.clone(), write_mesh(mesh)));
+                entry["file"] = file.into();
+            }
+        }
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        files.push((name, table.to_string().into_bytes()));
+        py.detach(|| write_all(folder_of(&path), &files)).map_err(raised)
+    }
+
+    /// A scene of its parts, as pickle makes one.
+    #[staticmethod]
+    fn _of_parts(
+        py: Python<'_>,
+        text: String,
+        path: PathBuf,
+        given: &Bound<'_, PyDict>,
+    ) -> PyResult<Scene> {
+        let mut meshes = GivenMeshes::new();
+        for (name, mesh) in given {
+            meshes.insert(name.extract()?, mesh_of(&mesh)?);
+        }
+        py.detach(|| Scene::of_text(text, &path, Arc::new(meshes))).map_err(raised)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let (py, own) = (slf.py(), slf.get());
+        let given = PyDict::new(py);
+        for (name, mesh) in own.given.iter() {
+            let vertices = mesh.vertices.iter().flat_map(|vertex| vertex.to_array());
+            let vertices = PyArray1::from_iter(py, vertices).reshape([mesh.vertices.len(), 3])?;
+            let facets = PyArray1::from_iter(py, mesh.facets.iter().flatten().copied());
+            given.set_item(name, (vertices, facets.reshape([mesh.facets.len(), 3])?))?;
+        }
+        let parts = (&own.text, &own.path, given);
+        (slf.get_type().getattr("_of_parts")?, parts).into_pyobject(py)
     }
 }
 
+/// The entry of a mesh; one that is in no file goes into `given`.
+fn mesh_entry(name: &str, mesh: &Bound<'_, PyAny>, given: &mut GivenMeshes) -> PyResult<Table> {
+    let mut entry = Table::new();
+    let mut mesh = mesh.clone();
+    if let Ok(keys) = mesh.cast::<PyDict>() {
+        let own = keys.get_item("mesh")?;
+        let own =
+            own.ok_or_else(|| UsageError::new_err(format!("meshes[{name:?}] has no `mesh`")))?;
+        for (key, value) in keys {
+            let key: String = key.extract()?;
+            if key != "mesh" {
+                entry.insert(key.clone(), toml_value(&key, &value)?);
+            }
+        }
+        mesh = own;
+    }
+    let file = match mesh.extract::<PathBuf>() {
+        Ok(path) => path.to_string_lossy().into_owned(),
+        Err(_) => {
+            let own = mesh_of(&mesh)?;
+            own.validate()
+                .map_err(|error| UsageError::new_err(format!("meshes[{name:?}]: {error}")))?;
+            given.insert(name.to_owned(), own);
+            format!("given:{name}")
+        }
+    };
+    entry.insert("name".to_owned(), name.into());
+    entry.insert("file".to_owned(), file.into());
+    Ok(entry)
+}
+
+/// The region of a mesh.
+fn region_of(mesh: &str, materials: &Bound<'_, PyAny>) -> PyResult<Table> {
+    let material = if let Ok(materials) = materials.cast::<PyDict>() {
+        let material = materials.get_item(mesh)?;
+        material.ok_or_else(|| {
+            UsageError::new_err(format!("materials has nothing for mesh {mesh:?}"))
+        })?
+    } else {
+        materials.clone()
+    };
+    let material: String = material.extract()?;
+    Ok([("name", mesh.to_owned()), ("mesh", mesh.to_owned()), ("material", material)]
+        .into_iter()
+        .map(|(key, value)| (key.to_owned(), value.into()))
+        .collect())
+}
+
+/// A mesh of arrays, or of a library that has them.
+fn mesh_of(given: &Bound<'_, PyAny>) -> PyResult<Mesh> {
+    let refused = || {
+        PyTypeError::new_err(
+            "a mesh is (vertices, facets) of shapes (n, 3) and (k, 3), a mesh of trimesh or Open3D, or a path",
+        )
+    };
+    let (vertices, facets) = match given.extract::<(Bound<'_, PyAny>, Bound<'_, PyAny>)>() {
+        Ok(parts) => parts,
+        Err(_) => {
+            let facets = given.getattr("faces").or_else(|_| given.getattr("triangles"));
+            (given.getattr("vertices").map_err(|_| refused())?, facets.map_err(|_| refused())?)
+        }
+    };
+    let [vertices, facets] = [vertices, facets].map(|one| numbers(&one).ok_or_else(refused));
+    let mut mesh = Mesh::default();
+    mesh.vertices.extend(vertices?.into_iter().map(DVec3::from_array));
+    for (number, corners) in facets?.into_iter().enumerate() {
+        if corners.iter().any(|one| one.fract() != 0.0 || !(0.0..4e9).contains(one)) {
+            let problem = format!(
+                "facet {number} has the corners {corners:?}, which are no numbers of vertices"
+            );
+            return Err(UsageError::new_err(problem));
+        }
+        mesh.facets.push(corners.map(|one| one as u32));
+    }
+    Ok(mesh)
+}
+
+/// The rows of an array of three columns.
+fn numbers(given: &Bound<'_, PyAny>) -> Option<Vec<[f64; 3]>> {
+    let array: PyArrayLike2<'_, f64, AllowTypeChange> = given.extract().ok()?;
+    let rows = array.as_array();
+    (rows.ncols() == 3)
+        .then(|| rows.rows().into_iter().map(|row| [row[0], row[1], row[2]]).collect())
+}
+
 /// Sets a value in a table of tables.
-fn set(table: &mut toml::Table, key: &str, value: toml::Value) -> PyResult<()> {
+fn set(table: &mut Table, key: &str, value: Value) -> PyResult<()> {
     match key.split_once("__") {
         None => {
             table.insert(key.to_owned(), value);
             Ok(())
         }
         Some((outer, rest)) => {
-            let inner = table.entry(outer).or_insert_with(|| toml::Table::new().into());
+            let inner = table.entry(outer).or_insert_with(|| Table::new().into());
             match inner.as_table_mut() {
                 Some(inner) => set(inner, rest, value),
                 None => Err(UsageError::new_err(format!(
-                    "`{outer}` of the scene is no table; give it whole, as {outer}=..."
+                    "`{outer}` of the scene is not a table; give it whole, as {outer}=..."
                 ))),
             }
         }
@@ -153,7 +379,7 @@ fn set(table: &mut toml::Table, key: &str, value: toml::Value) -> PyResult<()> {
 }
 
 /// A value of Python as one of TOML.
-fn toml_value(key: &str, value: &Bound<'_, PyAny>) -> PyResult<toml::Value> {
+fn toml_value(key: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
     if value.is_instance_of::<PyBool>() {
         Ok(value.extract::<bool>()?.into())
     } else if value.is_instance_of::<PyInt>() {
@@ -163,20 +389,21 @@ fn toml_value(key: &str, value: &Bound<'_, PyAny>) -> PyResult<toml::Value> {
     } else if value.is_instance_of::<PyString>() {
         Ok(value.extract::<String>()?.into())
     } else if let Ok(dict) = value.cast::<PyDict>() {
-        let mut table = toml::Table::new();
+        let mut table = Table::new();
         for (name, value) in dict {
             let name: String = name.extract()?;
             let value = toml_value(&name, &value)?;
             table.insert(name, value);
         }
         Ok(table.into())
+    } else if let Ok(path) = value.call_method0("__fspath__") {
+        Ok(path.extract::<String>()?.into())
+    } else if value.hasattr("tolist")? {
+        // Numbers and arrays of numpy.
+        toml_value(key, &value.call_method0("tolist")?)
     } else if let Ok(items) = value.try_iter() {
-        let values: PyResult<Vec<toml::Value>> =
-            items.map(|item| toml_value(key, &item?)).collect();
+        let values: PyResult<Vec<Value>> = items.map(|item| toml_value(key, &item?)).collect();
         Ok(values?.into())
-    } else if let Ok(number) = value.extract::<f64>() {
-        // A number of numpy.
-        Ok(number.into())
     } else {
         Err(PyTypeError::new_err(format!("a scene has no such value as {key}={value}")))
     }

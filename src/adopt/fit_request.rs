@@ -231,9 +231,14 @@ impl<'a> FitRequest<'a> {
         match (self.alpha, path) {
             (Some(value), Some(path)) => Ok(Some((path.clone(), value))),
             (Some(_), None) => Err(Error::usage("this model has no alpha", "leave --alpha out")),
+            (None, Some(path))
+                if self.method == FitMethod::TlsTail && is_held(path, &self.fixed) =>
+            {
+                Ok(None)
+            }
             (None, _) if self.method == FitMethod::TlsTail => Err(Error::usage(
                 "tls-tail takes the tail's exponent as given",
-                "give it with --alpha, or use --method tls to find it",
+                "hold it, or use the method tls to find it (--alpha, --method)",
             )),
             (None, _) => Ok(None),
         }

@@ -6,12 +6,15 @@ use super::admission;
 use super::fit_request::out_of_range;
 use super::fit_storage::{FitStorage, StoredFit, render_fit};
 use super::fit_subject::FitSubject;
+use super::provenance::activity;
 use crate::catalogue::exchange::{Details, Foreign};
 use crate::error::Error;
 use crate::fit::FitResult;
-use crate::material::Activity;
 use crate::setup::{Database, find_material};
 use crate::store::Store;
+
+/// Class of a new material that states none.
+const USUAL_CLASS: &str = "sample";
 
 /// A fit with its curve, for a material that need not be there yet.
 pub struct FittedMaterial<'a> {
@@ -49,22 +52,30 @@ impl FittedMaterial<'_> {
         let is_known =
             subject.found.is_some() || !matches!(found, Err(Error::UnknownMaterial { .. }));
         if is_known {
+            let stated = [&details.class, &details.description];
+            if stated.iter().any(|detail| detail.is_some()) {
+                return Err(Error::usage(
+                    format!("`{name}` is there, and has a class and a description"),
+                    "leave them out, or give another name",
+                ));
+            }
             return storage.save(subject, fit_name, result, database);
         }
-        let details = Details { curve: Some(subject.curve_name.clone()), ..details };
+        let class = details.class.or_else(|| Some(USUAL_CLASS.to_owned()));
+        let details = Details { curve: Some(subject.curve_name.clone()), class, ..details };
         let (mut material, _) =
             Foreign::Csv.read(&subject.label, &subject.curve.write(), &details)?;
         let [curve] = &mut material.curves[..] else {
             return Err(Error::usage("the curve has no point", "measure again"));
         };
-        // A file has fewer digits, and the fit is of these.
+        // The text of a file is rounded: keep the very points that were fitted.
         curve.observations.clone_from(&subject.curve.observations);
         let (curve, source) = (curve.name.clone(), curve.source.clone());
         let is_open = render_fit(&mut material, result, fit_name, [&curve, &source], false);
         admission::check(&material, Path::new(&subject.label))?;
         let mut store = database.write()?;
-        let inputs = Vec::new();
-        store.record(Activity { command: "fit".to_owned(), inputs, origin: None });
+        let files: Vec<_> = subject.file.as_deref().into_iter().collect();
+        store.record(activity("fit", &files)?);
         let added = store.add([&material])?;
         Ok(StoredFit {
             material: name,

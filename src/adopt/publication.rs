@@ -96,6 +96,14 @@ impl<'a> Publication<'a> {
         &self.report
     }
 
+    /// The page of a report without its other files.
+    ///
+    /// # Errors
+    /// A picture that cannot be drawn.
+    pub fn page_alone(&self) -> Result<Vec<u8>, Error> {
+        self.report.page(&NextSteps { is_alone: true, ..self.next.clone() })
+    }
+
     /// The files of a diagnosis of which nothing is stored.
     ///
     /// # Errors

@@ -130,14 +130,28 @@ impl<'a> CloudRequest<'a> {
         scene_text: String,
         store: Option<&Store>,
     ) -> Result<CheckedRequest<'a>, Error> {
-        let antenna = self.receiver.map(|name| self.antenna(&scene, name)).transpose()?;
-        check_predicted(&scene, self.scene, antenna)?;
         let ready = ReadyScene::new(scene, self.scene, store)?;
+        let checked = self.check_ready(ready, scene_text, store)?;
+        checked.check_output()?;
+        Ok(checked)
+    }
+
+    /// As [`CloudRequest::check_scene`], of a scene with its materials, and without a look at the folder of the report.
+    ///
+    /// # Errors
+    /// As [`CloudRequest::check`].
+    pub fn check_ready(
+        self,
+        ready: ReadyScene,
+        scene_text: String,
+        store: Option<&Store>,
+    ) -> Result<CheckedRequest<'a>, Error> {
+        let antenna = self.receiver.map(|name| self.antenna(&ready.scene, name)).transpose()?;
+        check_predicted(&ready.scene, self.scene, antenna)?;
         check_declared(&ready, self.scene, antenna)?;
         let further = self.further.iter().map(|(_, path)| FurtherScene::load(path, store));
         let further = further.collect::<Result<Vec<_>, _>>()?;
         self.check_together(&ready, &further)?;
-        self.check_output(&ready, &further)?;
         let recipient = self.material.map(|name| find_recipient(&ready, name)).transpose()?;
         if self.add {
             check_beside(self.scene)?;
@@ -222,23 +236,6 @@ impl<'a> CloudRequest<'a> {
         Ok(())
     }
 
-    /// Checks that the answer will not replace what is read, or somebody's own scene or material.
-    fn check_output(&self, ready: &ReadyScene, further: &[FurtherScene]) -> Result<(), Error> {
-        let mut written = Vec::new();
-        for material in &ready.materials {
-            written.push(material_file(&material.name));
-        }
-        written.push(AFTER.to_owned());
-        let mut named = named_files(&ready.scene, self.scene);
-        for (number, other) in further.iter().enumerate() {
-            written.push(after_of(number + 1));
-            named.extend(named_files(&other.ready.scene, &other.path));
-        }
-        let mut read = self.inputs();
-        read.extend(named.iter().map(PathBuf::as_path));
-        check_folder(self.folder, &read, &written)
-    }
-
     /// The effects to try: those that no scene declares, and that every scan can tell.
     fn choose_effects(&self, scenes: &[&ReadyScene]) -> Result<Choice, Error> {
         let mut declared = Vec::new();
@@ -296,6 +293,27 @@ impl<'a> CloudRequest<'a> {
 }
 
 impl CheckedRequest<'_> {
+    /// Checks that the answer will not replace what is read, or somebody's own scene or material.
+    ///
+    /// # Errors
+    /// The file that would be replaced.
+    pub fn check_output(&self) -> Result<(), Error> {
+        let CheckedRequest { request, ready, further, .. } = self;
+        let mut written = Vec::new();
+        for material in &ready.materials {
+            written.push(material_file(&material.name));
+        }
+        written.push(AFTER.to_owned());
+        let mut named = named_files(&ready.scene, request.scene);
+        for (number, other) in further.iter().enumerate() {
+            written.push(after_of(number + 1));
+            named.extend(named_files(&other.ready.scene, &other.path));
+        }
+        let mut read = request.inputs();
+        read.extend(named.iter().map(PathBuf::as_path));
+        check_folder(request.folder, &read, &written)
+    }
+
     /// Sentences on the scene and its materials that the report repeats.
     pub fn notices(&self) -> Vec<String> {
         let mut notices = Vec::new();
@@ -408,7 +426,7 @@ pub(super) fn material_file(name: &str) -> String {
 fn named_files(scene: &Scene, path: &Path) -> Vec<PathBuf> {
     let mut files = Vec::new();
     for mesh in &scene.file.mesh {
-        if !mesh.file.starts_with("builtin:") {
+        if mesh.is_in_a_file() {
             files.push(folder_of(path).join(&mesh.file));
         }
     }

@@ -79,7 +79,7 @@ pub fn relocate_files(
     folder: &Path,
 ) -> Result<SceneFile, Error> {
     let way = way(&real(folder_of(scene))?, &real(folder)?);
-    for mesh in file.mesh.iter_mut().filter(|mesh| !mesh.file.starts_with("builtin:")) {
+    for mesh in file.mesh.iter_mut().filter(|mesh| mesh.is_in_a_file()) {
         mesh.file = utf8(way.join(&mesh.file))?;
     }
     if let Pattern::Rays(scan) | Pattern::Angles(scan) = &mut file.radar.scan {

@@ -40,7 +40,7 @@ pub(super) fn recover(search: &Search, base: &State, effect: &dyn Effect) -> Pow
     let make = if problem.shared.is_any() { Folds::of_shared } else { Folds::new };
     let folds = &make(&problem.views.all_in_first(problem.shots), block_m, folds, seed);
     let scorer = Scorer { problem, folds, settings };
-    Bench { scorer, weight: search.sample.weight, base, effect }.power()
+    Bench { scorer, weight: search.sample.weight, base, effect, notify: search.notify }.power()
 }
 
 /// Where an effect is injected and searched for.
@@ -50,6 +50,7 @@ struct Bench<'a> {
     weight: f64,
     base: &'a State<'a>,
     effect: &'a dyn Effect,
+    notify: &'a (dyn Fn(&str) + Sync),
 }
 
 /// An effect of one strength.
@@ -77,6 +78,7 @@ impl Bench<'_> {
         let mut open: &[Rung] = &rungs;
         while let Some(rung) = open.get(open.len() / 2) {
             let (weaker, stronger) = open.split_at(open.len() / 2);
+            (self.notify)(&format!("controls: from which size {} is found", self.effect.name()));
             let Recovery { is_found, size_db } = self.search(tried, &rung.at);
             if is_found {
                 (found, open) = (Some(size_db), weaker);

@@ -110,7 +110,14 @@ impl CloudReading {
     /// When the bytes break the format, the powers betray a wrong unit, or the cloud cannot be used, see
     /// [`Cloud::new`].
     pub fn read(&self, format: PointFormat, bytes: &[u8]) -> Result<Cloud, CloudError> {
-        let mut table = PointTable::read(format, bytes)?;
+        self.read_table(PointTable::read(format, bytes)?)
+    }
+
+    /// Reads a table, as that of a file.
+    ///
+    /// # Errors
+    /// As [`CloudReading::read`].
+    pub fn read_table(&self, mut table: PointTable) -> Result<Cloud, CloudError> {
         table.rename(&self.columns)?;
         let theirs: Vec<String> = table.names().into_iter().map(str::to_owned).collect();
         table.lower_case();

@@ -1,6 +1,6 @@
 //! Why a scene cannot be loaded.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
@@ -66,4 +66,18 @@ pub enum SceneError {
         /// What is wrong.
         error: MeshError,
     },
+}
+
+impl SceneError {
+    /// The file that it is about.
+    pub fn file(&self) -> &Path {
+        match self {
+            SceneError::Unreadable { file, .. }
+            | SceneError::Format { file, .. }
+            | SceneError::Radar { file, .. }
+            | SceneError::Region { file, .. }
+            | SceneError::Value { file, .. }
+            | SceneError::Mesh { file, .. } => file,
+        }
+    }
 }

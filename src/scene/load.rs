@@ -6,7 +6,7 @@ use super::error::SceneError;
 use super::file::SceneFile;
 use super::read::{read_regular, read_text};
 use super::receivers;
-use super::target::Target;
+use super::target::{GivenMeshes, Target};
 use crate::radar::{Chirps, Radar};
 
 /// A scene, ready to be rendered.
@@ -40,16 +40,29 @@ impl Scene {
 
     /// Loads what a scene file describes; relative paths start from the folder of `path`.
     pub fn resolve(file: SceneFile, path: &Path) -> Result<Scene, SceneError> {
+        Scene::resolve_given(file, path, &GivenMeshes::new())
+    }
+
+    /// As [`Scene::resolve`]; the file of a mesh may be `given:NAME`, with that name in `given`.
+    ///
+    /// # Errors
+    /// As [`Scene::resolve`].
+    pub fn resolve_given(
+        file: SceneFile,
+        path: &Path,
+        given: &GivenMeshes,
+    ) -> Result<Scene, SceneError> {
         let folder = path.parent().unwrap_or(Path::new(""));
-        Scene::resolve_with(file, path, |name| {
+        Scene::resolve_with(file, path, given, |name| {
             read_regular(&folder.join(name)).map_err(|e| e.to_string())
         })
     }
 
-    /// Loads what a scene file describes; `read_csv` gives the bytes of its file of rays.
+    /// As [`Scene::resolve_given`]; `read_csv` gives the bytes of its file of rays.
     pub(crate) fn resolve_with(
         mut file: SceneFile,
         path: &Path,
+        given: &GivenMeshes,
         read_csv: impl Fn(&str) -> Result<Vec<u8>, String>,
     ) -> Result<Scene, SceneError> {
         let at = |error| SceneError::Radar { file: path.to_owned(), error };
@@ -69,7 +82,7 @@ impl Scene {
         if file.name.is_empty() {
             file.name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         }
-        let target = Target::load(&file, path)?;
+        let target = Target::load(&file, path, given)?;
         Ok(Scene { file, chirps, target })
     }
 }

@@ -19,4 +19,4 @@ pub(crate) use read::read_regular;
 pub use read::read_text;
 pub use reference::{ReferenceShape, ReferenceTarget};
 pub use regions::RegionError;
-pub use target::{BUILTIN_MESHES, MeshReport, Region, Target};
+pub use target::{BUILTIN_MESHES, GivenMeshes, MeshReport, Region, Target};

@@ -1,5 +1,6 @@
 //! The target: all meshes of a scene in the global frame, as one.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
@@ -80,9 +81,26 @@ const MOST_OFFSET_M: f64 = 1.0;
 pub const BUILTIN_MESHES: [&str; 6] =
     ["mannequin", "cuboid", "plate", "sphere", "sphere-cap", "trihedral"];
 
+/// Meshes that are in no file, in m, by the names after `given:`.
+pub type GivenMeshes = BTreeMap<String, Mesh>;
+
+/// What the file of a mesh begins with that is in no file.
+const GIVEN: &str = "given:";
+
+impl MeshEntry {
+    /// Whether it is read from a file, and is not built in or given.
+    pub fn is_in_a_file(&self) -> bool {
+        !self.file.starts_with("builtin:") && !self.file.starts_with(GIVEN)
+    }
+}
+
 impl Target {
     /// Loads, places and joins the meshes of a scene, and assigns its regions.
-    pub(super) fn load(file: &SceneFile, path: &Path) -> Result<Target, SceneError> {
+    pub(super) fn load(
+        file: &SceneFile,
+        path: &Path,
+        given: &GivenMeshes,
+    ) -> Result<Target, SceneError> {
         if file.mesh.is_empty() {
             return Err(value(path, "the scene", "has no mesh", "add a [[mesh]] table"));
         }
@@ -93,7 +111,7 @@ impl Target {
                 let place = format!("mesh `{}`", entry.name);
                 return Err(value(path, &place, "is defined twice", "rename one"));
             }
-            let (loaded, file_blake3) = load_mesh(entry, path)?;
+            let (loaded, file_blake3) = load_mesh(entry, path, given)?;
             let placed = cut(place(loaded, entry, path)?, entry, path)?;
             let at = |error| SceneError::Mesh { file: PathBuf::from(&entry.file), error };
             meshes.push(report(&placed, entry, file_blake3, mesh.facets.len()).map_err(at)?);
@@ -197,7 +215,21 @@ fn count_regions(file: &SceneFile, region_of_facet: &[u16]) -> Vec<Region> {
 }
 
 /// A mesh in its own frame, and the hash of its file.
-fn load_mesh(entry: &MeshEntry, scene: &Path) -> Result<(Mesh, Option<String>), SceneError> {
+fn load_mesh(
+    entry: &MeshEntry,
+    scene: &Path,
+    given: &GivenMeshes,
+) -> Result<(Mesh, Option<String>), SceneError> {
+    if let Some(name) = entry.file.strip_prefix(GIVEN) {
+        return given.get(name).map(|mesh| (mesh.clone(), None)).ok_or_else(|| {
+            value(
+                scene,
+                &format!("mesh `{}`", entry.name),
+                &format!("the mesh `{}` is one that a program gives, and none did", entry.file),
+                "save it as a .ply, and name that file",
+            )
+        });
+    }
     if let Some(name) = entry.file.strip_prefix("builtin:") {
         return builtin(name).map(|mesh| (mesh, None)).ok_or_else(|| {
             let known = BUILTIN_MESHES.join(", ");

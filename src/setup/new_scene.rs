@@ -11,7 +11,7 @@ use crate::formats::words::significant;
 use crate::frames::{Global, Point};
 use crate::material::Scale;
 use crate::measure::{Cloud, median_point, radar_place};
-use crate::scene::{Scene, SceneError, SceneFile};
+use crate::scene::{GivenMeshes, Scene, SceneError, SceneFile};
 use crate::units::dbm_from_watts;
 
 /// What a scene is made of.
@@ -234,12 +234,12 @@ impl NewScene<'_> {
         let text = String::from_utf8_lossy(&files[0].1);
         let mut file = SceneFile::parse(&text)
             .map_err(|error| SceneError::Format { file: self.scene_file.to_owned(), error })?;
-        for mesh in file.mesh.iter_mut().filter(|mesh| !mesh.file.starts_with("builtin:")) {
+        for mesh in file.mesh.iter_mut().filter(|mesh| mesh.is_in_a_file()) {
             let path = std::path::absolute(&mesh.file);
             mesh.file = path.map_or(mesh.file.clone(), |path| path.display().to_string());
         }
         let rays = files.get(1).map(|(_, bytes)| bytes.clone()).unwrap_or_default();
-        Ok(Scene::resolve_with(file, self.scene_file, |_| Ok(rays.clone()))?)
+        Ok(Scene::resolve_with(file, self.scene_file, &GivenMeshes::new(), |_| Ok(rays.clone()))?)
     }
 }
 

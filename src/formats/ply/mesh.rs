@@ -1,4 +1,4 @@
-//! PLY to triangle mesh.
+//! PLY to triangle mesh, and back.
 
 use std::fmt::Write;
 
@@ -63,6 +63,24 @@ pub fn read_mesh(bytes: &[u8]) -> Result<Mesh, FormatError> {
     check_labels("tristrips", facets, mesh.labels.len(), bytes.len())?;
     mesh.push_unnamed(strips);
     Ok(mesh)
+}
+
+/// A binary file of vertices, in double precision, and facets; labels of facets are left out.
+pub fn write_mesh(mesh: &Mesh) -> Vec<u8> {
+    let (vertices, facets) = (mesh.vertices.len(), mesh.facets.len());
+    let mut bytes = format!(
+        "ply\nformat binary_little_endian 1.0\nelement vertex {vertices}\nproperty double x\nproperty double y\n\
+         property double z\nelement face {facets}\nproperty list uchar uint vertex_indices\nend_header\n"
+    )
+    .into_bytes();
+    bytes.extend(
+        mesh.vertices.iter().flat_map(|vertex| vertex.to_array()).flat_map(f64::to_le_bytes),
+    );
+    for facet in &mesh.facets {
+        bytes.push(3);
+        bytes.extend(facet.iter().flat_map(|index| index.to_le_bytes()));
+    }
+    bytes
 }
 
 /// The triangles of strips, of which every other one runs the other way round.
@@ -243,6 +261,13 @@ mod tests {
 
     fn message(text: &str) -> String {
         read_mesh(text.as_bytes()).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_mesh_that_was_written_is_read_again() {
+        let vertices = vec![DVec3::new(0.1, -1e-300, 7.0), DVec3::X, DVec3::Y, DVec3::ONE];
+        let mesh = Mesh { vertices, facets: vec![[0, 1, 2], [3, 2, 1]], labels: Vec::new() };
+        assert_eq!(read_mesh(&write_mesh(&mesh)).unwrap(), mesh);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! PLY: triangle meshes in, tables of points in and out.
+//! PLY: triangle meshes and tables of points, in and out.
 //!
 //! All three encodings are read. The header's grammar is the `ply-rs` crate's; the counts it claims
 //! are checked against the file's length before anything is allocated, and the data are then read
@@ -17,5 +17,5 @@ mod parallel;
 mod table;
 
 pub use header::Scalar;
-pub use mesh::read_mesh;
+pub use mesh::{read_mesh, write_mesh};
 pub use table::{Column, Table, read_table, write_table};

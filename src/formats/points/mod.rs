@@ -70,13 +70,19 @@ impl PointTable {
     /// The place at which the bytes break the format.
     pub fn read(format: PointFormat, bytes: &[u8]) -> Result<PointTable, FormatError> {
         let cells = match format {
-            PointFormat::Ply => Cells::Numbers(numbers(ply::read_table(bytes)?)),
+            PointFormat::Ply => return Ok(of_ply(ply::read_table(bytes)?)),
             PointFormat::Csv => Cells::Text(csv::Table::parse(bytes, Names::InFirstLine)?),
             PointFormat::Xyz => Cells::Text(text(bytes)?),
             PointFormat::Pcd => Cells::Numbers(pcd::read(bytes)?),
             PointFormat::Las => Cells::Numbers(las::read(bytes)?),
         };
         Ok(PointTable { cells })
+    }
+
+    /// Points of columns of equal length, by their names.
+    pub fn of_columns(columns: Vec<(String, Vec<f64>)>) -> PointTable {
+        let (names, columns) = columns.into_iter().unzip();
+        PointTable { cells: Cells::Numbers(Numbers { names, columns }) }
     }
 
     /// Leaves out the points that have no place: of which a cell in one of these columns is not a number, as in the empty pixels
@@ -215,10 +221,9 @@ impl PointTable {
     }
 }
 
-fn numbers(table: ply::Table) -> Numbers {
+fn of_ply(table: ply::Table) -> PointTable {
     let columns = table.columns.into_iter().map(|column| (column.name, column.values));
-    let (names, columns) = columns.unzip();
-    Numbers { names, columns }
+    PointTable::of_columns(columns.collect())
 }
 
 /// Text whose header may be missing.

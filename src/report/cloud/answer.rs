@@ -38,6 +38,8 @@ pub struct NextSteps {
     pub scene_after: String,
     /// The scene that `--add` writes next to the old one.
     pub scene_beside: String,
+    /// Whether the page stands without the other files.
+    pub is_alone: bool,
     /// Whether what was found was stored.
     pub is_stored: bool,
     /// Materials that were stored, with their revisions.
