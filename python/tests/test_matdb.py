@@ -101,6 +101,15 @@ def test_errors_are_the_sentences_of_the_command_line(scene, tmp_path):
     with pytest.raises(md.StoreError):
         md.open("foreign.sqlite")
     assert issubclass(md.SceneError, md.Error)
+    with pytest.raises(md.UnknownMaterialError) as unknown:
+        md.open()["coton"]
+    assert isinstance(unknown.value, md.MaterialError) and isinstance(unknown.value, KeyError)
+    assert unknown.value.hint == "did you mean `cotton`?" and not str(unknown.value).startswith("'")
+    Path("out.ply").write_bytes(b"ply\nend_header\n")
+    with pytest.raises(md.CloudError) as cloud:
+        md.Cloud.load("out.ply")
+    assert cloud.value.file == Path("out.ply") and cloud.value.hint
+    assert md.UsageError("a word").hint is None
 
 
 def test_a_database_is_a_mapping_of_materials(scene):
@@ -126,6 +135,14 @@ def test_scenes_and_databases_can_be_pickled(scene):
     assert other.to_dict()["seed"] == 9
     assert md.render(other).file("cloud.ply") == md.render(scene, seed=9).file("cloud.ply")
     assert pickle.loads(pickle.dumps(md.open("a.sqlite"))).path == Path("a.sqlite")
+    scan = md.render(scene)
+    again = pickle.loads(pickle.dumps(scan))
+    assert repr(again) == repr(scan) and all(again.file(name) == scan.file(name) for name in scan.file_names)
+    assert np.array_equal(again.power_dbm, scan.power_dbm, equal_nan=True) and again.show().html == scan.show().html
+    points = md.Cloud(scan.xyz_m, scan.points_dbm, chirp=scan.cloud["chirp"])
+    copy = pickle.loads(pickle.dumps(points))
+    assert np.array_equal(copy.xyz_m, points.xyz_m) and np.array_equal(copy.chirp, points.chirp)
+    assert np.array_equal(copy.power_dbm, points.power_dbm) and np.all(np.isnan(copy.range_m))
 
 
 def test_threads_render_the_same(scene):
@@ -161,6 +178,83 @@ except KeyboardInterrupt:
     assert said == "interrupted\n" and running.returncode == 0
 
 
+def test_an_interruption_ends_the_command(scene, tmp_path):
+    words = ["diagnose", "out/cloud.ply", "--scene", "builtin:concealed", "-o", "why"]
+    md.render(md.load_scene("builtin:concealed")).save("out")
+    running = subprocess.Popen([sys.executable, "-c", COMMAND, *words], cwd=tmp_path, stderr=subprocess.DEVNULL)
+    time.sleep(2)
+    running.send_signal(signal.SIGINT)
+    assert running.wait(timeout=5) == -signal.SIGINT and not Path("why").exists()
+
+
+def plate_of(side_m):
+    """Two triangles that face a radar in front of z = 0."""
+    half = side_m / 2
+    vertices = np.array([[-half, -half, 0], [half, -half, 0], [half, half, 0], [-half, half, 0]])
+    return vertices, np.array([[0, 1, 2], [0, 2, 3]])
+
+
+def test_a_scene_is_made_of_arrays(scene, tmp_path):
+    tables = {key: scene.to_dict()[key] for key in ["seed"]}
+    radar = {"scan": {"pattern": "raster", "lines": 12, "chirps_per_line": 12, "width_m": 0.2, "height_m": 0.2},
+             "speckle": {"looks": 4, "form": "independent"}}
+    at = {"translation_m": np.array([0, 1.1, 0])}
+    arrays = md.Scene(meshes={"plate": {"mesh": plate_of(1.0), **at}}, materials="mannequin-paint", name="plate", radar=radar,
+                      **tables)
+    assert arrays.regions == ["plate"] and arrays.chirps == 144
+    expected = md.render(scene).power_dbm
+    assert np.allclose(md.render(arrays).power_dbm, expected, atol=1e-3, equal_nan=True)
+    again = pickle.loads(pickle.dumps(arrays))
+    assert md.render(again).file("cloud.ply") == md.render(arrays).file("cloud.ply")
+    arrays.replace(seed=3).save("kept/scene.toml")
+    assert sorted(path.name for path in Path("kept").iterdir()) == ["mesh-0.ply", "scene.toml"]
+    said = command(tmp_path, "render", "kept/scene.toml", "-o", "by-command")
+    assert said.returncode == 0, said.stderr
+    assert files("by-command")["power.exr"] == md.render(arrays, seed=3).file("power.exr")
+    # As libraries of meshes have them, beside a built-in one.
+    import trimesh
+
+    vertices, facets = plate_of(1.0)
+    solid = trimesh.Trimesh(vertices, facets, process=False)
+    both = md.Scene(meshes={"plate": {"mesh": solid, **at}, "ball": {"mesh": "builtin:sphere", "size_m": [0.1] * 3}},
+                    materials={"plate": "mannequin-paint", "ball": "steel"}, radar=radar)
+    assert both.regions == ["plate", "ball"]
+    with pytest.raises(md.UsageError, match="nothing for mesh .ball."):
+        md.Scene(meshes={"ball": "builtin:sphere"}, materials={"plate": "steel"})
+    with pytest.raises(TypeError, match="a mesh is"):
+        md.Scene(meshes={"ball": 7}, materials="steel")
+    with pytest.raises(md.UsageError, match="facet 0"):
+        md.Scene(meshes={"plate": (vertices, facets - 1)}, materials="steel")
+    with pytest.raises(md.UsageError, match="vertex 9"):
+        md.Scene(meshes={"plate": (vertices, [[0, 1, 9]])}, materials="steel")
+    with pytest.raises(md.SceneError, match="a program gives"):
+        md.Scene.from_text(arrays.text, "scene.toml")
+
+
+def test_points_of_arrays_are_checked_as_those_of_files(scene):
+    scan = md.render(scene)
+    for watts in [10 ** (scan.points_dbm.astype(float) / 10 - 3), np.full(len(scan.points_dbm), 1e-8)]:
+        with pytest.raises(md.CloudError, match="these are watts, not dBm"):
+            md.Cloud(scan.xyz_m, watts)
+    for chirp in [-1, 1.7, 2**33]:
+        with pytest.raises(md.CloudError, match="chirp number"):
+            md.Cloud(scan.xyz_m[:1], [-60], chirp=[chirp])
+    cloud = md.Cloud(scan.xyz_m[:2], [-60, -61], chirp=[np.nan, 3], range_m=[8.0, np.nan])
+    assert np.array_equal(cloud.chirp, [np.nan, 3], equal_nan=True)
+    assert np.array_equal(cloud.range_m, [8.0, np.nan], equal_nan=True)
+    Path("relative.csv").write_text("X,Y,Z,Intensity\n100,1100,0,-3\n0,1100,0,0\n")
+    names = {"X": "x_mm", "Y": "y_mm", "Z": "z_mm", "Intensity": "power_db"}
+    relative = md.Cloud.load("relative.csv", columns=names)
+    assert relative.is_relative and np.allclose(relative.power_dbm, [-3, 0]) and relative.xyz_m[0, 0] == 0.1
+    assert pickle.loads(pickle.dumps(relative)).is_relative
+    with pytest.raises(md.UsageError, match="unit = .cm. is not known"):
+        md.Cloud.load("relative.csv", unit="cm")
+    with pytest.raises(TypeError, match="give a matdb.Cloud, a matdb.Scan or the path"):
+        md.measure(7, scene)
+    with pytest.raises(TypeError, match="give a matdb.Scene, or the path"):
+        md.render(7)
+
+
 def test_memory_does_not_grow(scene):
     def kilobytes():
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -177,7 +271,7 @@ def examples():
     root = Path(__file__).parent.parent.parent
     pages = [(root / page).read_text() for page in ["python/README.md", "docs/python.md"]]
     found = [example for page in pages for example in re.findall(r"```python\n(.*?)```", page, re.DOTALL)]
-    assert len(found) == 5
+    assert len(found) == 6
     return found
 
 
@@ -199,7 +293,11 @@ def test_a_fit_is_that_of_the_command_line(scene, tmp_path):
     assert held.parameters["diffuse.alpha"] == 4.0
     with pytest.raises(md.Error, match="the model has no parameter `alpha`"):
         md.fit("cotton", fixed={"alpha": 4.0})
-    with pytest.raises(ValueError, match="there is no method `guess`"):
+    tail = md.fit("cotton", method="tls-tail", fixed={"diffuse.alpha": 3.0})
+    assert tail.parameters["diffuse.alpha"] == 3.0
+    with pytest.raises(md.UsageError, match="hold it"):
+        md.fit("cotton", method="tls-tail")
+    with pytest.raises(md.UsageError, match="method = .guess. is not known; give censored"):
         md.fit("cotton", method="guess")
 
 
@@ -251,8 +349,15 @@ def test_a_diagnosis_is_that_of_the_command_line(tmp_path, monkeypatch):
         md.diagnose("out/cloud.ply", "bench.toml", effects=["patch"])
     with pytest.raises(ValueError, match="give \\(n, 3\\)"):
         md.Cloud([[0, 0, 1]], [-40, -50])
-    with pytest.raises(md.Error, match="the cloud has no points"):
+    with pytest.raises(md.CloudError, match="the cloud has no points"):
         md.Cloud(np.zeros((0, 3)), [])
+    with pytest.raises(md.DiagnoseError):
+        md.diagnose(md.Cloud(scan.xyz_m[:40], scan.points_dbm[:40]), "bench.toml", controls=False)
+    # The answer stays what it was when cloud and folder have changed.
+    Path("out/cloud.ply").write_bytes(b"")
+    monkeypatch.chdir(tmp_path / "why")
+    why.save("../again")
+    assert files("../again")["residuals.csv"] == by_hand["residuals.csv"]
 
 
 def test_a_fit_of_arrays_becomes_a_material(scene):
@@ -263,6 +368,27 @@ def test_a_fit_of_arrays_becomes_a_material(scene):
     assert np.all(np.isfinite(fit.covariance))
     db = md.open("mine.sqlite")
     assert db.add("my-plate", fit, source="A test, 2026", licence="CC0-1.0", kind="synthetic") == ["my-plate@1"]
+    assert db["my-plate"].kind == "synthetic" and db["my-plate"].material_class == "sample"
+    assert db.add("of-a-scan", md.measure(scan, scene).fit("lambert"), source="A test", licence="CC0-1.0") == ["of-a-scan@1"]
+    assert db["of-a-scan"].kind == "synthetic"
+    with pytest.raises(md.UsageError, match="has a class and a description"):
+        db.add("my-plate", fit, source="A test", licence="CC0-1.0", kind="synthetic", material_class="paint")
+    with pytest.raises(md.UsageError, match="a fit is added alone"):
+        db.add("another", fit, files=["x.csv"])
+    with pytest.raises(md.UsageError, match="details belong to a file or a fit"):
+        db.add("cotton", source="A test, 2026")
+    # A fit of a material's own curve stays in it.
+    with pytest.raises(md.UsageError, match="belongs to `cotton`"):
+        db.add("my-cotton", md.fit("cotton", db=db))
+    assert db.add("cotton", md.fit("cotton", db=db)) == ["cotton@1"]
+    curve.save("measured")
+    details = {"source": "A file, 2026", "licence": "CC0-1.0", "kind": "synthetic", "frequency_ghz": 300}
+    assert db.add(files=["measured/curve.csv"], name="of-a-file", material_class="paint", **details) == ["of-a-file@1"]
+    of_file = md.fit("measured/curve.csv", model="lambert")
+    assert db.add("fit-of-a-file", of_file, **details) == ["fit-of-a-file@1"]
+    assert [one["name"] for one in db.history("fit-of-a-file")[0]["activity"]["inputs"]] == ["curve.csv"]
+    with pytest.raises(md.Error, match="kind"):
+        db.add("without-a-kind", of_file, source="A file, 2026", licence="CC0-1.0")
     assert db["my-plate"].sigma0_db([10])[0] == fit.sigma0_db([10])[0]
     assert db.add("my-plate", curve.fit("lambert", seed=3), source="A test, 2026", licence="CC0-1.0", kind="synthetic")
     assert db.check()["findings"] == []
@@ -380,7 +506,7 @@ def test_a_database_says_and_does_what_the_command_line_does(scene, tmp_path):
     assert other.remove("steel", "ptfe") == [{"slug": "steel", "revisions": 2}, {"slug": "ptfe", "revisions": 1}]
     with pytest.raises(md.Error, match="`steel`"):
         other.remove("steel")
-    with pytest.raises(ValueError, match="there is no format `xml`; there are csv"):
+    with pytest.raises(md.UsageError, match="format = .xml. is not known; give csv"):
         db.export("cotton", "cotton.xml", format="xml")
     with pytest.raises(md.StoreError, match="none.sqlite"):
         md.open("none.sqlite").publish("nowhere")
