@@ -2,6 +2,9 @@
 
 use std::path::Path;
 
+use matdb::formats::exr;
+use matdb::geometry::Raster;
+
 use crate::support::{entries, matdb, scene};
 
 fn render(threads: &str, more: &[&str], scene: &Path) -> Vec<(String, Vec<u8>)> {
@@ -34,6 +37,36 @@ fn the_tracer_changes_no_byte() {
             ["bvh", "pinhole"].map(|t| render("2", &["--tracer", t], &scene(name)));
         assert!(bvh == pinhole && bvh == render("1", &[], &scene(name)), "{name}");
     }
+}
+
+/// Cropped images have the pixels of whole ones, at the same places.
+#[test]
+fn cropped_images_are_parts_of_whole_ones() {
+    let image = |more: &[&str]| {
+        let files = render("2", more, &scene("human.toml"));
+        let (_, bytes) = files.iter().find(|(name, _)| name == "power.exr").unwrap();
+        exr::read(bytes).unwrap()
+    };
+    let (whole, cropped) = (image(&[]), image(&["--crop", "auto"]));
+    assert!(cropped.width < whole.width && cropped.height <= whole.height);
+    let corner = |from: &Raster, to: f64, at: fn(&Raster, usize) -> f64| {
+        (0..whole.width.max(whole.height))
+            .find(|index| (at(from, *index) - to).abs() < 1e-9)
+            .unwrap()
+    };
+    let column = corner(&whole, cropped.x_m(0), Raster::x_m);
+    let row = corner(&whole, cropped.y_m(0), Raster::y_m);
+    let part = whole.part([row..row + cropped.height, column..column + cropped.width]);
+    let bits = |image: &Raster| {
+        let values = image.channels.iter().flat_map(|channel| &channel.values);
+        values.map(|value| value.to_bits()).collect::<Vec<_>>()
+    };
+    assert_eq!(bits(&part), bits(&cropped));
+    let [all, kept] = [&whole, &cropped].map(|image| {
+        let powers = image.channel("power_dbm").unwrap();
+        powers.iter().filter(|power| !power.is_nan()).count()
+    });
+    assert_eq!(all, kept);
 }
 
 #[test]

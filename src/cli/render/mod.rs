@@ -39,6 +39,9 @@ pub(super) struct Args {
     /// Also write the beat signals: beat.npy, chirps x samples; needs [radar.receiver]
     #[arg(long)]
     beat: bool,
+    /// Cut the images: `auto` ends them a spot beyond what any antenna detected
+    #[arg(long, value_name = "auto", value_parser = ["auto"])]
+    crop: Option<String>,
     /// Do not compress power.exr, for programs that cannot unpack it
     #[arg(long)]
     uncompressed: bool,
@@ -61,6 +64,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         all_hits: args.all,
         beat,
         view: args.view,
+        crop: args.crop.is_some(),
         packing: if args.uncompressed { Packing::Uncompressed } else { Packing::Zip16 },
         ..RenderRequest::new(&ready)
     };

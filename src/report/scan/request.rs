@@ -8,6 +8,7 @@ use super::record::ScanRecord;
 use crate::error::Error;
 use crate::formats::exr::Packing;
 use crate::geometry::Raster;
+use crate::geometry::raster::joined;
 use crate::render::RenderError;
 use crate::report::json::json_file;
 use crate::setup::{ReadyScene, View};
@@ -30,6 +31,8 @@ pub struct RenderRequest<'a> {
     pub packing: Packing,
     /// Whether there is a page for each antenna that shows its cloud in three dimensions.
     pub view: bool,
+    /// Whether images end a spot beyond what any antenna detected.
+    pub crop: bool,
 }
 
 /// A stage of a rendering.
@@ -94,6 +97,7 @@ impl<'a> RenderRequest<'a> {
             beat: None,
             packing,
             view: false,
+            crop: false,
         }
     }
 
@@ -121,6 +125,12 @@ impl<'a> RenderRequest<'a> {
 
         progress(RenderProgress::Begin(RenderStage::Image));
         let mut images: Vec<Raster> = views.iter().map(|view| ready.image(&view.scan)).collect();
+        let mut crossed_images: Vec<Raster> =
+            crossed.iter().map(|view| ready.image(&view.scan)).collect();
+        if self.crop {
+            let margin_m = ready.scene.radar().spot_fwhm_m();
+            crop(images.iter_mut().chain(&mut crossed_images), margin_m);
+        }
 
         progress(RenderProgress::Begin(RenderStage::Encode));
         let validity = ready.validity(&setup, &footprints);
@@ -129,8 +139,6 @@ impl<'a> RenderRequest<'a> {
         record.rays_ended = footprints.ended;
         let content = Content { all_hits, packing: self.packing, view: self.view };
         let mut files = content.encode(ready, &views, &images, &record)?;
-        let crossed_images: Vec<Raster> =
-            crossed.iter().map(|view| ready.image(&view.scan)).collect();
         files.extend(content.encode(ready, &crossed, &crossed_images, &record)?);
         files.push(("scan.json".to_owned(), json_file(&record)?));
         if let Some(shape) = self.beat {
@@ -141,5 +149,20 @@ impl<'a> RenderRequest<'a> {
         views.extend(crossed);
         images.extend(crossed_images);
         Ok(RenderFiles { views, images, record, files })
+    }
+}
+
+/// Cuts images of one size to what is detected in any of them, and a margin around it.
+fn crop<'a>(images: impl Iterator<Item = &'a mut Raster>, margin_m: f64) {
+    let images: Vec<&mut Raster> = images.collect();
+    let filled = images.iter().filter_map(|image| image.filled("power_dbm")).reduce(joined);
+    let Some(filled) = filled else { return };
+    for image in images {
+        let margin = (margin_m / image.pixel_m).ceil() as usize;
+        let [rows, columns] = filled.clone();
+        let wider = [(rows, image.height), (columns, image.width)].map(|(filled, most)| {
+            filled.start.saturating_sub(margin)..(filled.end + margin).min(most)
+        });
+        *image = image.part(wider);
     }
 }
