@@ -26,6 +26,36 @@ fn was_quiet(browser: &Browser) {
     }
 }
 
+/// Sends the scene mouse events: type, pixel, button and the buttons that are down.
+const SEND: &str = "const cloud = document.querySelector('#cloud'); \
+    const { left, top } = cloud.getBoundingClientRect(); \
+    const send = (type, x, y, button, buttons) => cloud.dispatchEvent(new PointerEvent(type, \
+    { pointerId: 1, pointerType: 'mouse', clientX: left + x, clientY: top + y, button, buttons }));";
+
+/// A right button whose release went to a menu does not turn the scene.
+fn stays_when_a_menu_takes_the_release(browser: &Browser) {
+    let moves = "send('pointerdown', 100, 100, 2, 2); send('pointermove', 150, 100, -1, 0); \
+                 send('pointermove', 200, 100, -1, 0); return window.matdbView.state().camera";
+    assert_eq!(browser.script(&format!("{SEND} {moves}")), Value::Null);
+}
+
+/// Graphics memory that the browser takes and gives back holds the scene again: a click finds a point.
+fn returns_after_lost_graphics(browser: &Browser, [x, y]: [f64; 2]) {
+    let lost = "return !document.querySelector('#lost').hidden";
+    browser.script(
+        "const graphics = document.querySelector('#cloud').getContext('webgl2'); \
+         window.memory = graphics.getExtension('WEBGL_lose_context'); window.memory.loseContext()",
+    );
+    browser.wait(lost);
+    browser.script("window.memory.restoreContext()");
+    browser.wait(&lost.replace('!', ""));
+    // Not before the next frame.
+    browser.wait(&format!(
+        "{SEND} window.matdbView.pick(null); send('pointerdown', {x}, {y}, 0, 1); \
+         send('pointerup', {x}, {y}, 0, 0); return window.matdbView.state().point !== null"
+    ));
+}
+
 #[test]
 fn a_rendering_is_shown_in_three_dimensions() {
     let folder = tempfile::tempdir().unwrap();
@@ -76,6 +106,8 @@ fn a_rendering_is_shown_in_three_dimensions() {
         browser.script(&script).as_f64().unwrap()
     });
     assert!((0.0..wide).contains(&x) && (0.0..high).contains(&y), "{x} {y} of {wide} {high}");
+    stays_when_a_menu_takes_the_release(&browser);
+    returns_after_lost_graphics(&browser, [x, y]);
     was_quiet(&browser);
 }
 
@@ -104,7 +136,12 @@ fn a_diagnosis_shows_residuals_and_where_its_effects_act() {
         detected.lines().skip(1).filter(|line| line.split(',').nth(1) != Some("")).count();
     assert_eq!(browser.script(SHOWN), json!(detected));
     let said = browser.text("return document.body.innerText");
-    assert!(said.contains("foreign-patch: outline"), "{said}");
+    for words in ["foreign-patch: outline", "Observed − predicted power with the effects, from"] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    let labels = browser.text("return document.querySelector('#column').textContent");
+    assert!(labels.contains("predicted power with the effects, dBm"), "{labels}");
+    assert!(labels.contains("material"), "{labels}");
     let state: Value = browser.script("return window.matdbView.state()");
     assert!(state.to_string().contains("residual_after_db"), "{state}");
     was_quiet(&browser);

@@ -47,6 +47,8 @@ pub(super) fn rows(
             theta_rad: shot.hit.theta_rad(),
             azimuth_rad: shot.azimuth_rad,
             range_m: shot.hit.range_m,
+            measured_range_m: seen.range_m,
+            point: seen.point,
             range_residual_m: seen.range_m.zip(arrived).map(|(seen_m, a)| seen_m - a.range_m),
             xt_m: there.xt_m,
             yt_m: there.yt_m,

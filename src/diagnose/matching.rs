@@ -338,7 +338,10 @@ impl Scan<'_> {
                     observation.limit_w = Some(point.power_w);
                 } else if is_near && is_first {
                     on_target += 1;
-                    *observation = Observation::detected(point.power_w, Some(range_m));
+                    *observation = Observation {
+                        point: Some(point.point),
+                        ..Observation::detected(point.power_w, Some(range_m))
+                    };
                     // Noise hardly ever reaches more.
                     if self.reported.returns == Returns::Strongest
                         && point.power_w <= self.most_alarm_w()

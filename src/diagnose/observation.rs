@@ -1,6 +1,7 @@
 //! The record of a chirp, and the declared properties of the receiver.
 
 use crate::effects::MeanEcho;
+use crate::frames::{Global, Point};
 
 /// dB in one e-fold.
 pub(super) const DB: f64 = 10.0 / std::f64::consts::LN_10;
@@ -12,6 +13,8 @@ pub struct Observation {
     pub power_w: Option<f64>,
     /// Range, m; `None` where nothing was detected or the cloud has no range.
     pub range_m: Option<f64>,
+    /// Where the cloud has the detection; `None` where nothing was detected, or where the record is simulated.
+    pub point: Option<Point<Global>>,
     /// Power that an echo without a detection stayed below, W: that of a false alarm which was reported instead, or
     /// 1 MW where a nearer detection ended the chirp; `None` for the threshold.
     pub limit_w: Option<f64>,
@@ -23,7 +26,7 @@ pub(super) const NO_LIMIT_W: f64 = 1e6;
 impl Observation {
     /// A detection.
     pub(super) fn detected(power_w: f64, range_m: Option<f64>) -> Observation {
-        Observation { power_w: Some(power_w), range_m, limit_w: None }
+        Observation { power_w: Some(power_w), range_m, point: None, limit_w: None }
     }
 
     /// Power that an echo without a detection stayed below, W.

@@ -10,6 +10,7 @@ use super::residual::ResidualStructure;
 use super::score::Errors;
 use crate::brdf::Brdf;
 use crate::effects::{Effect, Level, Place, Shot};
+use crate::frames::{Global, Point};
 
 /// Version of a report as JSON.
 pub const SCHEMA: u32 = 3;
@@ -265,6 +266,10 @@ pub struct Row {
     pub azimuth_rad: f64,
     /// Range of the mesh, m.
     pub range_m: f64,
+    /// Measured range, m: half of the way to the antenna; none where there is no range.
+    pub measured_range_m: Option<f64>,
+    /// Where the cloud has the detection; none where nothing was detected.
+    pub point: Option<Point<Global>>,
     /// Measured less predicted range with the effects, m; none where there is no range.
     pub range_residual_m: Option<f64>,
     /// x in the target plane, m; of several clouds in that of the first, where its antenna sees the same point of the target.

@@ -533,6 +533,8 @@ fn a_cloud_finds_its_shots() {
     assert!((behind.range_m - shots[8].hit.range_m - 0.5).abs() < 1e-9);
     assert_eq!(beside.shot.map(|shot| shot.chirp), Some(missed));
     assert_eq!(found.observations.iter().filter(|o| o.power_w.is_some()).count(), 8);
+    // They stay where the cloud has them.
+    assert_eq!(found.observations[20].point, Some(points[0].point));
     // Without their numbers, points find their chirps by their directions.
     points.pop();
     points.iter_mut().for_each(|point| point.chirp = None);

@@ -4,7 +4,7 @@ use super::models::shown;
 use super::outline::Outline;
 use super::places::strongest;
 use super::raster::{CHANNEL, Pick, Plane, empty, filled, pixel_m};
-use crate::diagnose::{Errors, Report};
+use crate::diagnose::{Errors, Report, Row};
 use crate::formats::figure::drawing::{Drawing, Shape};
 use crate::formats::figure::{Figure, FigureError, Scale};
 use crate::formats::words::signed;
@@ -16,6 +16,9 @@ use crate::units::db_from_ratio;
 const MOST: f64 = 0.98;
 /// Share of the pixels within the scale of colours on a map without speckle, whose structure may be in few pixels.
 const NEARLY_ALL: f64 = 0.999;
+
+/// Shortest and longest reach of the colours of a residual, dB.
+const RESIDUAL_REACH_DB: [f64; 2] = [0.5, 10.0];
 
 /// What a map shows.
 struct Subject {
@@ -46,17 +49,29 @@ pub(super) fn residuals(report: &Report, plane: Plane) -> Result<Picture, Figure
         title: "Residual over the target",
         quantity: "observed − predicted, dB",
         gaps: "no detection",
-        reach: [0.5, 10.0],
+        reach: RESIDUAL_REACH_DB,
         share: MOST,
         caption: "Observed − predicted power over the target plane, averaged over the detections \
                   of each pixel. Red is more power than predicted, blue less. A model that is right leaves speckle without shape.",
     };
     let notes = [error_note(&report.error.before), error_note(&report.error.after)];
-    let picks: [Pick; 2] = [
-        |row| Some(db_from_ratio(row.observed_w? / row.before_w)),
-        |row| Some(db_from_ratio(row.observed_w? / row.after_w)),
-    ];
+    let picks: [Pick; 2] =
+        [|row| Some(db_from_ratio(row.observed_w? / row.before_w)), residual_after_db];
     maps(&subject, report, plane, before_after(report, notes, picks))
+}
+
+/// Observed − predicted power with the effects, dB; none where nothing was detected.
+fn residual_after_db(row: &Row) -> Option<f64> {
+    Some(db_from_ratio(row.observed_w? / row.after_w))
+}
+
+/// Mean of observed − predicted power with the effects, dB, over the target plane of a radar with a spot of this diameter, m;
+/// and how far its colours reach to both sides of 0, dB.
+pub(in crate::report) fn map_after(rows: &[Row], spot_m: f64) -> (Raster, f64) {
+    let around = empty(rows, pixel_m(rows, spot_m));
+    let map = filled(&around, rows, residual_after_db);
+    let reach_db = reach(&map, RESIDUAL_REACH_DB, MOST);
+    (map, reach_db)
 }
 
 fn error_note(errors: &Errors) -> String {

@@ -12,7 +12,7 @@ mod quantiles;
 mod raster;
 mod record;
 #[cfg(test)]
-mod testing;
+pub(super) mod testing;
 mod text;
 mod trends;
 
@@ -29,7 +29,9 @@ use crate::error::Error;
 use places::Peak;
 
 pub use answer::{CloudAnswer, NextSteps};
+pub(super) use maps::map_after;
 pub(super) use outline::Outline;
+pub(super) use raster::CHANNEL;
 pub use record::CloudRecord;
 
 /// A report on a cloud with its pictures drawn.

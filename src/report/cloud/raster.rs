@@ -5,7 +5,7 @@ use crate::geometry::Raster;
 use crate::geometry::raster::Channel;
 
 /// Name of the only channel.
-pub(super) const CHANNEL: &str = "residual";
+pub(in crate::report) const CHANNEL: &str = "residual";
 
 /// Shots in a pixel, in the mean, from which speckle does not hide the rest.
 const SHOTS_PER_PIXEL: f64 = 8.0;

@@ -1,16 +1,17 @@
 //! Rows for the tests of pictures.
 
 use crate::diagnose::Row;
+use crate::frames::Point;
 
 /// Shots 4 mm apart in a square of 0.4 m, with what is unknown at each place, dB.
-pub(super) fn square(unknown_db: impl Fn(f64, f64) -> f64) -> Vec<Row> {
+pub(in crate::report) fn square(unknown_db: impl Fn(f64, f64) -> f64) -> Vec<Row> {
     let at_m = |i: u32| 0.004 * f64::from(i);
     let places = (0..10_000).map(|i| (at_m(i % 100), at_m(i / 100)));
     places.map(|(x, y)| Row { xt_m: x, yt_m: y, unknown_db: unknown_db(x, y), ..row() }).collect()
 }
 
 /// A shot with usual values.
-pub(super) fn row() -> Row {
+pub(in crate::report) fn row() -> Row {
     Row {
         scan: 0,
         chirp: 0,
@@ -23,6 +24,8 @@ pub(super) fn row() -> Row {
         theta_rad: 0.2,
         azimuth_rad: 0.0,
         range_m: 8.0,
+        measured_range_m: Some(8.0),
+        point: Some(Point::new(0.0, 1.1, 0.0)),
         range_residual_m: Some(0.0),
         xt_m: 0.0,
         yt_m: 0.0,

@@ -1,10 +1,10 @@
-//! What stands around a cloud: the radar with its scan, and the power image.
+//! What stands around a cloud: the radar with its scan, and an image of the target plane.
 
 use std::f64::consts::TAU;
 
 use glam::DVec3;
 
-use super::page::{Instrument, Numbers, PowerImage};
+use super::page::{Instrument, Numbers, PlaneImage};
 use crate::error::Error;
 use crate::formats::base64::base64;
 use crate::formats::figure::{Figure, Scale};
@@ -33,31 +33,35 @@ pub(super) fn instrument(scene: &Scene) -> Instrument {
     }
 }
 
-/// A power image in the target plane.
+/// A channel of a raster of the target plane as an image, in the colours of a figure. `label`: what the colours are.
 ///
 /// # Errors
-/// A raster without power.
-pub(super) fn power_image(image: &Raster) -> Result<PowerImage, Error> {
+/// A raster without this channel.
+pub(super) fn plane_image(
+    raster: &Raster,
+    channel: &str,
+    (scale, range): (Scale, Option<(f64, f64)>),
+    label: String,
+) -> Result<PlaneImage, Error> {
     let figure = Figure {
-        raster: image,
-        channel: "power_dbm",
+        raster,
+        channel,
         title: "",
         subtitle: "",
         colour_label: "",
-        range: None,
-        scale: Scale::Sequential,
+        range,
+        scale,
         gaps: "",
         x_label: "",
         y_label: "",
     };
-    Ok(PowerImage {
+    Ok(PlaneImage {
+        label,
         png: base64(&figure.pixels()?),
-        rows: image.height,
-        columns: image.width,
-        from_m: [image.x_m(0), image.y_m(0)],
-        step_m: [image.pixel_m, -image.pixel_m],
-        x_column: "xt_m",
-        y_column: "yt_m",
+        rows: raster.height,
+        columns: raster.width,
+        from_m: [raster.x_m(0), raster.y_m(0)],
+        step_m: [raster.pixel_m, -raster.pixel_m],
     })
 }
 

@@ -3,6 +3,7 @@
 
 mod around;
 mod diagnosis;
+mod labels;
 mod page;
 mod rendering;
 

@@ -3,31 +3,32 @@
 use glam::DVec3;
 use serde::Serialize;
 
+use super::labels::label;
 use crate::error::Error;
 use crate::formats::base64::base64;
+use crate::formats::words::{counted, grouped};
 use crate::geometry::Mesh;
 use crate::report::templates;
 
 /// A cloud in three dimensions, with what stands around it.
 #[derive(Serialize)]
 pub(in crate::report) struct ViewPage<'a> {
+    #[serde(skip)]
     pub title: &'a str,
-    pub made_by: &'static str,
-    pub kind: Kind,
+    /// What the cloud is, such as `Rendered cloud`.
+    #[serde(skip)]
+    pub kind: &'static str,
+    /// Sentences on what the page leaves out.
+    #[serde(skip)]
+    pub notes: Vec<String>,
+    /// Whether the target has moved from where its mesh is drawn, which then dims no points at first.
+    pub is_moved: bool,
     pub points: Points,
     pub mesh: Option<Surface>,
     pub radar: Option<Instrument>,
-    pub image: Option<PowerImage>,
+    pub image: Option<PlaneImage>,
     pub shapes: Vec<Outlines>,
     pub curve: Option<Curve>,
-}
-
-/// What a cloud is.
-#[derive(Clone, Copy, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub(in crate::report) enum Kind {
-    Render,
-    Diagnosis,
 }
 
 /// The points of a cloud.
@@ -69,9 +70,11 @@ pub(in crate::report) struct Instrument {
     pub spot_m: Numbers,
 }
 
-/// The power image, and where it lies.
+/// An image of the target plane, and where it lies.
 #[derive(Serialize)]
-pub(in crate::report) struct PowerImage {
+pub(in crate::report) struct PlaneImage {
+    /// What its colours are.
+    pub label: String,
     /// Bytes of a PNG file, a pixel each.
     pub png: String,
     pub rows: usize,
@@ -79,15 +82,16 @@ pub(in crate::report) struct PowerImage {
     /// Centre of the first pixel, m.
     pub from_m: [f64; 2],
     pub step_m: [f64; 2],
-    pub x_column: &'static str,
-    pub y_column: &'static str,
 }
 
 /// Where an effect that was found acts.
 #[derive(Serialize)]
 pub(in crate::report) struct Outlines {
-    pub label: String,
-    pub lines_m: Numbers,
+    label: String,
+    /// The places of all lines, one line after the other.
+    lines_m: Numbers,
+    /// Number of places up to the end of each line.
+    ends: Vec<usize>,
 }
 
 /// Two columns that are drawn as a curve.
@@ -119,22 +123,11 @@ impl Numbers {
 }
 
 impl Values {
-    /// Numbers; the end of a column's name is its unit.
+    /// Numbers under the name of their column.
     pub fn numbers(name: &str, values: impl Iterator<Item = f64>) -> Values {
-        const UNITS: [(&str, &str); 6] = [
-            ("_dbm", "dBm"),
-            ("_db", "dB"),
-            ("_deg", "°"),
-            ("_rad", "rad"),
-            ("_m", "m"),
-            ("_s", "s"),
-        ];
-        let (stem, unit) = UNITS
-            .iter()
-            .find_map(|(end, unit)| Some((name.strip_suffix(end)?, *unit)))
-            .unwrap_or((name, ""));
-        let (label, values) = (stem.replace('_', " "), Numbers::floats(values));
-        Values { name: name.to_owned(), label, unit, values, names: None }
+        let (label, unit) = label(name);
+        let values = Numbers::floats(values);
+        Values { name: name.to_owned(), label: label.to_owned(), unit, values, names: None }
     }
 
     /// Numbers of names. What has none gets a name of its own, `other`.
@@ -148,27 +141,51 @@ impl Values {
         let numbers = numbers.map(|number| number.map_or(last, |known| known.min(last)) as u16);
         let bytes: Vec<u8> = numbers.flat_map(u16::to_le_bytes).collect();
         let names = names.iter().chain([&other]).map(|name| (*name).to_owned()).collect();
+        let (label, unit) = label(name);
         let values = Numbers::U16(base64(&bytes));
-        Values {
-            name: name.to_owned(),
-            label: name.to_owned(),
-            unit: "",
-            values,
-            names: Some(names),
-        }
+        Values { name: name.to_owned(), label: label.to_owned(), unit, values, names: Some(names) }
     }
 }
+
+impl Outlines {
+    /// A line through some places, with a gap at each that is missing; none where no two follow each other.
+    pub fn new(label: String, places: &[Option<DVec3>]) -> Option<Outlines> {
+        let (mut line, mut ends) = (Vec::new(), Vec::new());
+        for piece in places.split(Option::is_none).filter(|piece| piece.len() > 1) {
+            line.extend(piece.iter().flatten());
+            ends.push(line.len());
+        }
+        (!ends.is_empty()).then(|| Outlines {
+            label,
+            lines_m: Numbers::places(line.into_iter()),
+            ends,
+        })
+    }
+}
+
+/// Facets that a page can draw. With more it would be slow to load.
+const MOST_FACETS: usize = 300_000;
 
 impl Surface {
     /// A mesh; none of one that would make the page slow to load.
     pub fn of(mesh: &Mesh) -> Option<Surface> {
-        const MOST_FACETS: usize = 300_000;
         if mesh.facets.is_empty() || mesh.facets.len() > MOST_FACETS {
             return None;
         }
         let corners = mesh.facets.iter().flatten().flat_map(|corner| corner.to_le_bytes());
         let triangles = Numbers::U32(base64(&corners.collect::<Vec<u8>>()));
         Some(Surface { vertices_m: Numbers::places(mesh.vertices.iter().copied()), triangles })
+    }
+
+    /// A sentence on a mesh of which there is no surface for its size.
+    pub fn left_out(mesh: &Mesh) -> Option<String> {
+        (mesh.facets.len() > MOST_FACETS).then(|| {
+            format!(
+                "The mesh is not drawn. It has {}; this page draws at most {}.",
+                counted(mesh.facets.len(), "facet"),
+                grouped(MOST_FACETS)
+            )
+        })
     }
 }
 
@@ -179,11 +196,74 @@ impl ViewPage<'_> {
     /// A number that JSON does not have.
     pub fn bytes(&self) -> Result<Vec<u8>, Error> {
         #[derive(Serialize)]
-        struct Context<'a> {
+        struct Words<'a> {
             title: &'a str,
+            about: String,
+            notes: &'a [String],
+        }
+        #[derive(Serialize)]
+        struct Context<'a> {
+            page: Words<'a>,
             data: String,
         }
-        let data = serde_json::to_string(self)?;
-        templates::page("view.html", &Context { title: self.title, data })
+        let points = counted(self.points.count, "point");
+        let version = env!("CARGO_PKG_VERSION");
+        let about = format!("{} of {points}, made by matdb {version}", self.kind);
+        let page = Words { title: self.title, about, notes: &self.notes };
+        templates::page("view.html", &Context { page, data: serde_json::to_string(self)? })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_template_is_small() {
+        // Every diagnosis holds a copy of it.
+        const MOST_BYTES: usize = 60_000;
+        let bytes = include_str!("../templates/view.html").len();
+        assert!(bytes < MOST_BYTES, "view.html has {bytes} bytes");
+    }
+
+    #[test]
+    fn a_page_says_which_mesh_it_leaves_out() {
+        let facets = vec![[0, 1, 2]; MOST_FACETS + 1];
+        let large =
+            Mesh { vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y], facets, labels: vec![] };
+        let small = Mesh { facets: vec![[0, 1, 2]; 2], ..large.clone() };
+        assert!(Surface::of(&large).is_none() && Surface::of(&small).is_some());
+        assert_eq!(Surface::left_out(&small), None);
+        let page = ViewPage {
+            title: "Large <mesh>",
+            kind: "Rendered cloud",
+            notes: Surface::left_out(&large).into_iter().collect(),
+            is_moved: false,
+            points: Points {
+                count: 0,
+                position_m: Numbers::places(std::iter::empty()),
+                columns: vec![],
+            },
+            mesh: Surface::of(&large),
+            radar: None,
+            image: None,
+            shapes: vec![],
+            curve: None,
+        };
+        let page = String::from_utf8(page.bytes().unwrap()).unwrap();
+        for words in ["Large &lt;mesh&gt;", "Rendered cloud of 0 points", "It has 300 001 facets"] {
+            assert!(page.contains(words), "{words}");
+        }
+    }
+
+    #[test]
+    fn a_line_has_a_gap_where_places_are_missing() {
+        let [a, b] = [Some(DVec3::X), Some(DVec3::Y)];
+        let line = |places: &[_]| Outlines::new("border".to_owned(), places);
+        let ends = |places: &[_]| line(places).map(|line| line.ends);
+        assert_eq!(ends(&[a, b, b]), Some(vec![3]));
+        // A place alone is no line.
+        assert_eq!(ends(&[None, a, b, None, None, a, None, b, a, b]), Some(vec![2, 5]));
+        assert_eq!(ends(&[a, None, b]), None);
     }
 }

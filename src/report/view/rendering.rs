@@ -1,8 +1,9 @@
 //! `view.html` of a rendering.
 
-use super::around::{instrument, power_image};
-use super::page::{Curve, Kind, Numbers, Points, Surface, Values, ViewPage};
+use super::around::{instrument, plane_image};
+use super::page::{Curve, Numbers, Points, Surface, Values, ViewPage};
 use crate::error::Error;
+use crate::formats::figure::Scale;
 use crate::formats::ply::{Column, Table};
 use crate::geometry::Raster;
 use crate::render::COLOURS;
@@ -23,14 +24,17 @@ pub fn rendering_page(
     materials: &[&str],
 ) -> Result<Vec<u8>, Error> {
     let regions: Vec<&str> = scene.target.regions.iter().map(|one| one.name.as_str()).collect();
+    let colours = (Scale::Sequential, None);
+    let image = plane_image(image, "power_dbm", colours, "Received power".to_owned())?;
     let page = ViewPage {
         title: &scene.file.name,
-        made_by: concat!("matdb ", env!("CARGO_PKG_VERSION")),
-        kind: Kind::Render,
+        kind: "Rendered cloud",
+        notes: Surface::left_out(&scene.target.mesh).into_iter().collect(),
+        is_moved: false,
         points: points(cloud, &[("region", &regions), ("material", materials)]),
         mesh: Surface::of(&scene.target.mesh),
         radar: Some(instrument(scene)),
-        image: Some(power_image(image)?),
+        image: Some(image),
         shapes: Vec::new(),
         curve: Some(Curve { x: "incidence_deg", y: "power_dbm" }),
     };
