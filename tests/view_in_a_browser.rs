@@ -136,12 +136,15 @@ fn a_diagnosis_shows_residuals_and_where_its_effects_act() {
         detected.lines().skip(1).filter(|line| line.split(',').nth(1) != Some("")).count();
     assert_eq!(browser.script(SHOWN), json!(detected));
     let said = browser.text("return document.body.innerText");
-    for words in ["foreign-patch: outline", "Observed − predicted power with the effects, from"] {
+    assert!(said.contains("foreign-patch: outline"), "{said}");
+    for (part, words) in [
+        ("#column", "predicted power with the effects, dBm"),
+        ("#column", "material"),
+        ("#image-note", "Observed − predicted power with the effects, from"),
+    ] {
+        let said = browser.text(&format!("return document.querySelector('{part}').textContent"));
         assert!(said.contains(words), "{words}: {said}");
     }
-    let labels = browser.text("return document.querySelector('#column').textContent");
-    assert!(labels.contains("predicted power with the effects, dBm"), "{labels}");
-    assert!(labels.contains("material"), "{labels}");
     let state: Value = browser.script("return window.matdbView.state()");
     assert!(state.to_string().contains("residual_after_db"), "{state}");
     was_quiet(&browser);
