@@ -221,10 +221,13 @@ mod tests {
         let rows = [moved, silent];
         let [one] = &detections(&rows)[..] else { panic!() };
         assert_eq!(one.point, point.xyz);
-        let column = |name: &str| {
-            let columns = serde_json::to_value(columns(&scene(), &detections(&rows))).unwrap();
-            columns.as_array().unwrap().iter().find(|one| one["name"] == name).cloned().unwrap()
-        };
+        let columns = serde_json::to_value(columns(&scene(), &detections(&rows))).unwrap();
+        let columns = columns.as_array().unwrap();
+        let column = |name: &str| columns.iter().find(|one| one["name"] == name).unwrap();
+        for one in columns {
+            let is_plain = one["name"] == "region" || one["name"] == "material";
+            assert!(is_plain || one["label"] != one["name"], "{}", one["name"]);
+        }
         let range = column("range_m");
         assert_eq!(
             range["values"],
