@@ -182,7 +182,7 @@ def test_an_interruption_ends_the_command(scene, tmp_path):
     words = ["diagnose", "out/cloud.ply", "--scene", "builtin:concealed", "-o", "why"]
     md.render(md.load_scene("builtin:concealed")).save("out")
     running = subprocess.Popen([sys.executable, "-c", COMMAND, *words], cwd=tmp_path, stderr=subprocess.DEVNULL)
-    time.sleep(2)
+    time.sleep(4)
     running.send_signal(signal.SIGINT)
     assert running.wait(timeout=5) == -signal.SIGINT and not Path("why").exists()
 
