@@ -16,7 +16,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
-use crate::error::{UsageError, raised};
+use crate::error::{UsageError, no_choice, raised};
 use crate::scan::Scan;
 use crate::scene::Scene;
 
@@ -272,11 +272,6 @@ impl Cloud {
         ];
         (slf.get_type().getattr("_of_columns")?, (columns,)).into_pyobject(py)
     }
-}
-
-/// The refusal of a word that is none of a few.
-pub(crate) fn no_choice(key: &str, given: &str, known: &str) -> PyErr {
-    UsageError::new_err(format!("{key} = {given:?} is not known; give {known}"))
 }
 
 /// Our names for columns, by theirs.

@@ -21,8 +21,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use serde_json::json;
 
-use crate::cloud::no_choice;
-use crate::error::{UsageError, raised, warn};
+use crate::error::{UsageError, no_choice, raised, warn};
 use crate::fit::Fit;
 use crate::interrupt::interruptible;
 use crate::json::to_python;
@@ -280,7 +279,13 @@ impl Database {
 
     /// What differs between two materials or revisions, as `matdb diff --json` prints it.
     fn diff<'py>(&self, py: Python<'py>, before: &str, after: &str) -> PyResult<Bound<'py, PyAny>> {
-        let (before, after) = (self.find(py, before)?.material, self.find(py, after)?.material);
+        let found = py.detach(|| {
+            let store = self.read()?;
+            let [before, after] =
+                [before, after].map(|name| find_material(store.as_ref(), name, ""));
+            Ok((before?.material, after?.material))
+        });
+        let (before, after) = found.map_err(raised::<Error>)?;
         to_python(py, &py.detach(|| Diff::new(&before, &after)))
     }
 

@@ -83,6 +83,11 @@ fn file_of(error: &matdb::error::Error) -> Option<&Path> {
     }
 }
 
+/// The refusal of a word that is none of a few.
+pub(crate) fn no_choice(key: &str, given: &str, known: &str) -> PyErr {
+    UsageError::new_err(format!("{key} = {given:?} is not known; give {known}"))
+}
+
 /// Says what a person should not overlook.
 pub(crate) fn warn(py: Python<'_>, notices: &[String]) -> PyResult<()> {
     let warnings = py.import("warnings")?;

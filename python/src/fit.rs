@@ -12,9 +12,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::json;
 
-use crate::cloud::no_choice;
 use crate::database::Database;
-use crate::error::raised;
+use crate::error::{no_choice, raised};
 use crate::json::to_python;
 use crate::material::sigma0_db;
 use crate::measure::Instrument;

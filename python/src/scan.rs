@@ -15,9 +15,9 @@ use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyTuple};
 
-use crate::cloud::{Cloud, no_choice};
+use crate::cloud::Cloud;
 use crate::database::Database;
-use crate::error::raised;
+use crate::error::{no_choice, raised};
 use crate::interrupt::interruptible;
 use crate::scene::{Scene, SceneLike};
 

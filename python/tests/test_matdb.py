@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 import time
+import types
 from pathlib import Path
 
 import numpy as np
@@ -219,6 +220,9 @@ def test_a_scene_is_made_of_arrays(scene, tmp_path):
     both = md.Scene(meshes={"plate": {"mesh": solid, **at}, "ball": {"mesh": "builtin:sphere", "size_m": [0.1] * 3}},
                     materials={"plate": "mannequin-paint", "ball": "steel"}, radar=radar)
     assert both.regions == ["plate", "ball"]
+    # The names that Open3D has for the same.
+    other = types.SimpleNamespace(vertices=vertices, triangles=facets)
+    assert md.Scene(meshes={"plate": other}, materials="steel", radar=radar).chirps == 144
     with pytest.raises(md.UsageError, match="nothing for mesh .ball."):
         md.Scene(meshes={"ball": "builtin:sphere"}, materials={"plate": "steel"})
     with pytest.raises(TypeError, match="a mesh is"):
