@@ -4,6 +4,9 @@
 
 use clap::{Arg, Command, CommandFactory};
 
+/// The page with the table of what each command is in Python.
+const PYTHON: &str = include_str!("../docs/python.md");
+
 /// What writes the page.
 pub const COMMAND: &str = "cargo run --example commands > docs/commands.md";
 
@@ -35,10 +38,19 @@ fn section(command: &mut Command) -> String {
         format!("\n## {}\n\n{}.\n\n```text\n{usage}\n```\n\n", command.get_name(), prose(&about));
     let own = command.get_arguments().filter(|a| !a.is_global_set() && a.get_id() != "help");
     text += &list(own);
+    if let Some(call) = in_python(command.get_name()) {
+        text += &format!("\n[In Python](python.md#commands-in-python): {call}.\n");
+    }
     if let Some(after) = command.get_after_long_help().or(command.get_after_help()) {
         text += &format!("\n```text\n{}\n```\n", wrapped(after.to_string().trim_end()));
     }
     text
+}
+
+/// What a command is in Python, where it is anything.
+fn in_python(command: &str) -> Option<&'static str> {
+    let start = format!("| `{command}` | ");
+    PYTHON.lines().find_map(|row| row.strip_prefix(&start)?.strip_suffix(" |"))
 }
 
 /// Text with lines of at most 100 characters, as in a terminal; examples are shorter.

@@ -14,6 +14,7 @@ mod check_command;
 mod closed_forms;
 mod closest_hits;
 mod closing_the_loop;
+mod completions;
 mod damaged_pages;
 mod database;
 mod diagnose_add;

@@ -143,7 +143,7 @@ pub fn run(cli: &Cli) -> Result<(), Error> {
         Command::Verify(args) => verify::run(args, &console),
         Command::Import(args) => import::run(args, db, &console),
         Command::Export(args) => export::run(args, db, &console),
-        Command::Completions(args) => completions::run(args, Cli::command()),
+        Command::Completions(args) => completions::run(args, Cli::command(), db),
         Command::Man(args) => man::run(args, Cli::command(), &console),
     }
 }

@@ -9,6 +9,7 @@ use crate::store::Store;
 pub const USUAL_DATABASE: &str = "matdb.sqlite";
 
 /// The path of the database, and whether somebody named it.
+#[derive(Clone, Debug)]
 pub struct Database {
     path: PathBuf,
     asked_for: bool,
