@@ -162,7 +162,9 @@ def prepare_thin_mannequins():
 
 PREPARED = {
     "calibrating.md": prepare_calibration,
+    "own-cloud.md": prepare_thin_mannequins,
     "why-does-my-model-miss.md": prepare_thin_mannequins,
+    "measuring.md": prepare_thin_mannequins,
     "instrument.md": lambda: thin("showcase", 10, 0.9),
     "fitting-a-curve.md": prepare_curves,
     "diagnosing.md": prepare_measured_plate,

@@ -18,7 +18,7 @@ use crate::setup::Database;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   matdb completions bash > ~/.local/share/bash-completion/completions/matdb
-  matdb completions zsh > ~/.zfunc/_matdb        where fpath has ~/.zfunc
+  echo 'source <(matdb completions zsh)' >> ~/.zshrc        after its compinit
   matdb completions fish > ~/.config/fish/completions/matdb.fish
 
 The script asks `matdb` on your path. Names come from the database that --db or MATDB names, else from \
