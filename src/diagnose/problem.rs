@@ -56,24 +56,27 @@ impl<'a> Problem<'a> {
         effect.starts(&self.views.stages[0], self.shots)
     }
 
-    /// What the models of the scans predict, scan after scan. They have one receiver.
-    fn predict_by<'m>(&self, model: impl Fn(u16) -> Model<'m>) -> Prediction {
-        let mut all: Option<Prediction> = None;
+    /// What the models of the scans predict, scan after scan. They have one receiver. `predict` is for the shots of one scan.
+    fn predict_by<'m>(
+        &self,
+        model: impl Fn(u16) -> Model<'m>,
+        predict: impl Fn(&Model, &Stage, &[Shot], &PredictionCache) -> Vec<Prediction>,
+    ) -> Vec<Prediction> {
+        let mut all: Vec<Prediction> = Vec::new();
         for shots in self.shots.chunk_by(|a, b| a.scan == b.scan) {
             let scan = shots[0].scan;
             let traced = &self.traced[usize::from(scan)];
-            let part = model(scan).predict_with(self.stage(&shots[0]), shots, traced);
-            match &mut all {
-                None => all = Some(part),
-                Some(all) => {
-                    all.arrived.extend(part.arrived);
-                    all.tilts.extend(part.tilts);
-                }
+            let part = predict(&model(scan), self.stage(&shots[0]), shots, traced);
+            if all.is_empty() {
+                all = part;
+                continue;
+            }
+            for (all, part) in all.iter_mut().zip(part) {
+                all.arrived.extend(part.arrived);
+                all.tilts.extend(part.tilts);
             }
         }
-        all.unwrap_or_else(|| {
-            model(0).predict_with(&self.views.stages[0], self.shots, &PredictionCache::default())
-        })
+        all
     }
 
     /// Effective number of independent shots.
@@ -83,7 +86,13 @@ impl<'a> Problem<'a> {
 
     /// The prediction of a point.
     pub fn predict(&self, space: &Space, at: &DVector<f64>) -> Prediction {
-        self.predict_by(|scan| space.model(self.receiver, at, scan))
+        let model = |scan| space.model(self.receiver, at, scan);
+        let predict = |model: &Model, stage: &Stage, shots: &[Shot], traced: &PredictionCache| {
+            vec![model.predict_with(stage, shots, traced)]
+        };
+        let predicted = self.predict_by(model, predict).pop();
+        // Without shots.
+        predicted.unwrap_or_else(|| model(0).predict(&self.views.stages[0], self.shots))
     }
 
     /// The part of every chirp in the likelihood of a point.
@@ -244,21 +253,36 @@ impl<'a> Problem<'a> {
         at: &DVector<f64>,
         twists: &[Vec<Twist>],
     ) -> [Vec<Slope>; 6] {
-        let slopes = (0..6).into_par_iter().map(|axis| {
-            if twists.iter().flatten().all(|twist| twist[axis] == 0.0) {
-                return Vec::new();
-            }
-            let step = effect_step * TWIST_STEP[axis];
-            let [more, less] = [step, -step].map(|by| {
+        let moves = |axis: &usize| twists.iter().flatten().any(|twist| twist[*axis] != 0.0);
+        let axes: Vec<usize> = (0..6).filter(moves).collect();
+        if axes.is_empty() {
+            return Default::default();
+        }
+        let mut ends: Vec<Twist> = Vec::new();
+        for &axis in &axes {
+            for sign in [1.0, -1.0] {
                 let mut twist = Twist::default();
-                twist[axis] = by;
-                let model = |scan| space.model(self.receiver, at, scan).twisted(twist);
-                self.terms_of(&self.predict_by(model))
-            });
-            quotients(&more, &less, 2.0 * step)
-        });
-        let slopes: Vec<Vec<Slope>> = slopes.collect();
-        slopes.try_into().unwrap_or_default()
+                twist[axis] = sign * effect_step * TWIST_STEP[axis];
+                ends.push(twist);
+            }
+        }
+        let predictions = self.predict_by(
+            |scan| space.model(self.receiver, at, scan),
+            |model, stage, shots, traced| model.predict_twisted(stage, shots, &ends, traced),
+        );
+        let mut slopes: [Vec<Slope>; 6] = Default::default();
+        let of_axes: Vec<Vec<Slope>> = predictions
+            .par_chunks_exact(2)
+            .zip(&axes)
+            .map(|(ends, &axis)| {
+                let [more, less] = [0, 1].map(|end| self.terms_of(&ends[end]));
+                quotients(&more, &less, 2.0 * effect_step * TWIST_STEP[axis])
+            })
+            .collect();
+        for (axis, of_axis) in axes.into_iter().zip(of_axes) {
+            slopes[axis] = of_axis;
+        }
+        slopes
     }
 
     /// Slopes of ln mean before the receiver by every unknown that changes it. Unlike [`Term::ln_mean`]

@@ -12,6 +12,7 @@ use super::problem::{EFFECT_STEP, Problem, Slope};
 use super::space::Space;
 use crate::fit::minimise::{Local, Minimise, Stop};
 use crate::fit::shapes;
+use crate::lanes::{Wide, widest};
 
 /// A full search.
 pub(super) const SEARCH: Minimise = Minimise { iterations: 20, tolerance: 0.1, patience: PATIENCE };
@@ -219,30 +220,52 @@ fn ln_likelihood_without(terms: &[Term], folds: &Folds, fold: usize) -> f64 {
 
 /// −ln likelihood near a point, from the shots that count.
 fn local(terms: &[Term], slopes: &[Vec<Slope>], counts: impl Fn(usize) -> bool) -> Local {
-    let unknowns = slopes.len();
-    let moves_mean: Vec<bool> = slopes
-        .iter()
-        .map(|s| s.iter().any(|s| s.ln_mean.abs() > 1e-9 || s.range_m.abs() > 1e-12))
-        .collect();
-    let mut sum = Local::zero(unknowns);
-    let mut rows = [vec![0.0; unknowns], vec![0.0; unknowns], vec![0.0; unknowns]];
-    for (shot, term) in terms.iter().enumerate().filter(|(shot, _)| counts(*shot)) {
-        sum.value -= term.ln_p;
-        let [means, ranges, laws] = &mut rows;
-        for (index, slopes) in slopes.iter().enumerate() {
-            let slope = slopes[shot];
-            sum.gradient[index] -= slope.ln_p;
-            if moves_mean[index] {
-                (means[index], ranges[index]) = (slope.ln_mean, slope.range_m);
-            } else {
-                laws[index] = slope.ln_p;
+    widest(Sum { terms, slopes, counts })
+}
+
+/// The sum of what shots say of ln likelihood near a point.
+struct Sum<'a, C> {
+    terms: &'a [Term],
+    slopes: &'a [Vec<Slope>],
+    /// Whether a shot counts.
+    counts: C,
+}
+
+impl<C: Fn(usize) -> bool> Wide for Sum<'_, C> {
+    type Answer = Local;
+
+    #[inline(always)]
+    fn run(self) -> Local {
+        let Sum { terms, slopes, counts } = self;
+        let unknowns = slopes.len();
+        let moves_mean: Vec<bool> = slopes
+            .iter()
+            .map(|s| s.iter().any(|s| s.ln_mean.abs() > 1e-9 || s.range_m.abs() > 1e-12))
+            .collect();
+        let mut sum = Local::zero(unknowns);
+        let mut rows = [vec![0.0; unknowns], vec![0.0; unknowns], vec![0.0; unknowns]];
+        for (shot, term) in terms.iter().enumerate() {
+            if !counts(shot) {
+                continue;
+            }
+            sum.value -= term.ln_p;
+            let [means, ranges, laws] = &mut rows;
+            for (index, slopes) in slopes.iter().enumerate() {
+                let slope = slopes[shot];
+                sum.gradient[index] -= slope.ln_p;
+                if moves_mean[index] {
+                    (means[index], ranges[index]) = (slope.ln_mean, slope.range_m);
+                } else {
+                    laws[index] = slope.ln_p;
+                }
+            }
+            for (row, weight) in rows.iter().zip([term.bend, term.range_bend, term.weight.recip()])
+            {
+                sum.add(0.0, weight, row);
             }
         }
-        for (row, weight) in rows.iter().zip([term.bend, term.range_bend, term.weight.recip()]) {
-            sum.add(0.0, weight, row);
-        }
+        sum
     }
-    sum
 }
 
 #[cfg(test)]

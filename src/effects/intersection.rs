@@ -86,15 +86,15 @@ pub(super) fn motion(rotation: DMat3, pivot: DVec3, shift_m: DVec3) -> Pose<Glob
 }
 
 /// The shot at a target that has moved, and the direction of the radar from its surface. `ray` is its ray in the frame of
-/// the target, and `hit` the closest hit of that.
+/// the target, and `hit` the closest hit of that, on `facet`.
 pub(super) fn moved(
-    stage: &Stage,
+    facet: &Facet,
     shot: &Shot,
     target: Pose<Global, Global>,
     ray: Ray<Global>,
     hit: Hit,
 ) -> (Shot, Direction<Surface>) {
-    let surface = surface_at(stage, &ray, &hit);
+    let surface = facet.surface(&ray);
     let there = surface.shot(shot, ray, hit);
     let hit = Hit { point: target * there.hit.point, ..there.hit };
     let normal = target.rotation() * there.normal;

@@ -9,12 +9,11 @@ use super::cache::Cache;
 use super::ceiling::SaturationCurve;
 use super::echo::MeanEcho;
 use super::effect::{Effect, Survey};
-use super::intersection::moved;
-use super::library::pose::Pose as PoseEffect;
+use super::intersection::{Facet, moved};
 use super::receiver::Receiver;
 use super::shot::{Shot, Stage, returns_wave};
 use super::tilt::{NODES, nodes, tilted_cos_theta};
-use super::twist::Twist;
+use super::twist::{Twist, twisted};
 use super::way_back::WayBack;
 use crate::brdf::{Brdf, Retro, Scattering, Seen};
 use crate::frames::{Direction, Global, Pose, Ray, Surface};
@@ -65,6 +64,26 @@ pub struct PredictionCache {
     /// The product of all gains.
     gains: Cache<Vec<Key>, Vec<f64>>,
 }
+
+/// What a prediction needs of each shot's place on the target.
+struct Surfaces<'a> {
+    /// The coherent share of its echo; empty where no model returns a wave.
+    coherent: &'a [f64],
+    /// f of its scattering model without effects, 1/sr.
+    f_per_sr: &'a [f64],
+    /// The product of all gains.
+    gains: &'a [f64],
+}
+
+/// The echoes of some shots, and their random tilts; empty without such tilts.
+#[derive(Default)]
+struct Echoes {
+    arrived: Vec<Option<MeanEcho>>,
+    tilts: Vec<Tilts>,
+}
+
+/// Shots that one task evaluates with the target in a dozen places, so few that they stay in the processor's cache.
+const TWISTED_PER_TASK: usize = 64;
 
 /// Shots that one task evaluates, so many that loops over them fill vector instructions.
 const SHOTS_PER_TASK: usize = 256;
@@ -157,12 +176,6 @@ impl Prediction {
 }
 
 impl Model<'_> {
-    /// This model with the target moved a little further, after its effects have moved it.
-    pub(crate) fn twisted(mut self, by: Twist) -> Self {
-        self.effects.push((&PoseEffect, by.to_vec()));
-        self
-    }
-
     /// The prediction for every shot.
     pub fn predict(&self, stage: &Stage, shots: &[Shot]) -> Prediction {
         self.predict_with(stage, shots, &PredictionCache::default())
@@ -175,28 +188,102 @@ impl Model<'_> {
         shots: &[Shot],
         cache: &PredictionCache,
     ) -> Prediction {
-        // The intersections of all shots, with the effects that move the target.
+        // f of the scattering models and the gains, in caches of their own, since they depend on different values.
         let moving = self.keys(|effect| effect.moves());
         let make = || self.intersect_all(stage, shots);
         let intersections = cache.intersections.get_or_make(moving.clone(), make);
-        // f of the scattering models and the gains, in caches of their own, since they depend on different values.
         let key = (self.laws.clone(), moving);
-        let coherent =
-            cache.coherent.get_or_make(key.clone(), || self.coherent_shares(stage, &intersections));
-        let f_per_sr = cache.scattered.get_or_make(key, || {
-            let laws = self.retros();
-            let tasks = intersections.par_chunks(SHOTS_PER_TASK);
-            tasks.map(|shots| self.f_per_sr(stage, &laws, shots)).collect::<Vec<_>>().concat()
-        });
-        let gains = cache.gains.get_or_make(self.keys(|_| true), || {
-            let tasks = intersections.par_chunks(SHOTS_PER_TASK);
-            tasks.map(|shots| self.gains(stage, shots)).collect::<Vec<_>>().concat()
-        });
+        let make = || self.coherent_shares(stage, &intersections);
+        let coherent = cache.coherent.get_or_make(key.clone(), make);
+        let f_per_sr =
+            cache.scattered.get_or_make(key, || self.all_f_per_sr(stage, &intersections));
+        let gains =
+            cache.gains.get_or_make(self.keys(|_| true), || self.all_gains(stage, &intersections));
+        let surfaces = Surfaces { coherent: &coherent, f_per_sr: &f_per_sr, gains: &gains };
+        self.arrived_together(stage, shots, self.echoes(stage, &intersections, surfaces), cache)
+    }
+
+    /// The predictions with the target moved a little further in each of these ways, after the effects have moved it. The rays
+    /// of a shot nearly coincide then: they are traced together, and mostly hit one facet.
+    pub(crate) fn predict_twisted(
+        &self,
+        stage: &Stage,
+        shots: &[Shot],
+        twists: &[Twist],
+        cache: &PredictionCache,
+    ) -> Vec<Prediction> {
+        let ways: Vec<Pose<Global, Global>> =
+            twists.iter().map(|twist| twisted(stage.middle, twist)).collect();
+        let echoes = |shots: &[Shot]| {
+            let of_ways = self.intersect_twisted(stage, shots, &ways);
+            let echoes = of_ways.into_iter().map(|shots| {
+                let surfaces = Surfaces {
+                    coherent: &self.coherent_shares(stage, &shots),
+                    f_per_sr: &self.f_per_sr(stage, &self.retros(), &shots),
+                    gains: &self.gains(stage, &shots),
+                };
+                self.echoes(stage, &shots, surfaces)
+            });
+            echoes.collect::<Vec<_>>()
+        };
+        let tasks: Vec<Vec<Echoes>> = shots.par_chunks(TWISTED_PER_TASK).map(echoes).collect();
+        let joined = |way: usize| {
+            let mut all = Echoes::default();
+            for task in &tasks {
+                all.arrived.extend_from_slice(&task[way].arrived);
+                all.tilts.extend_from_slice(&task[way].tilts);
+            }
+            self.arrived_together(stage, shots, all, cache)
+        };
+        (0..ways.len()).into_par_iter().map(joined).collect()
+    }
+
+    /// The intersections of shots with the target moved a little further in each of these ways, way by way.
+    fn intersect_twisted(
+        &self,
+        stage: &Stage,
+        shots: &[Shot],
+        ways: &[Pose<Global, Global>],
+    ) -> Vec<Vec<Option<Intersection>>> {
+        let mut placed = Vec::with_capacity(shots.len() * ways.len());
+        for shot in shots {
+            let target = self.target(stage, shot);
+            placed.extend(ways.iter().map(|way| target.map_or(*way, |target| *way * target)));
+        }
+        let of_shots = shots.iter().zip(placed.chunks_exact(ways.len()));
+        let rays: Vec<Ray<Global>> = of_shots
+            .flat_map(|(shot, placed)| placed.iter().map(|target| target.inverse() * shot.ray))
+            .collect();
+        let hits = stage.geometry.bvh.closest_of_spots(&rays, ways.len());
+        let mut found: Vec<_> = ways.iter().map(|_| Vec::with_capacity(shots.len())).collect();
+        let mut facet: Option<(u32, Facet)> = None;
+        for (at, (hit, (ray, target))) in hits.into_iter().zip(rays.iter().zip(&placed)).enumerate()
+        {
+            let (shot, way) = (&shots[at / ways.len()], at % ways.len());
+            found[way].push(hit.map(|hit| {
+                let (_, facet) = match facet.take() {
+                    Some(known) if known.0 == hit.facet => facet.insert(known),
+                    _ => facet.insert((hit.facet, Facet::of(stage, hit.facet as usize))),
+                };
+                let (shot, to_radar) = moved(facet, shot, *target, *ray, hit);
+                Intersection::new(stage, shot, to_radar)
+            }));
+        }
+        found
+    }
+
+    /// The echoes of shots with these intersections, before effects on all shots together.
+    fn echoes(
+        &self,
+        stage: &Stage,
+        intersections: &[Option<Intersection>],
+        Surfaces { coherent, f_per_sr, gains }: Surfaces,
+    ) -> Echoes {
         // Equation (11), shot by shot.
-        let mut arrived: Vec<Option<MeanEcho>> = intersections
+        let arrived: Vec<Option<MeanEcho>> = intersections
             .par_iter()
-            .zip(&*f_per_sr)
-            .zip(&*gains)
+            .zip(f_per_sr)
+            .zip(gains)
             .enumerate()
             .map(|(shot, ((intersection, f_per_sr), gain))| {
                 let intersection = intersection.as_ref()?;
@@ -206,18 +293,40 @@ impl Model<'_> {
                 Some(MeanEcho { coherent_share, ..echo })
             })
             .collect();
-        let receiver = self.received();
-        let tilts = if receiver.tilt_sd_rad > 0.0 {
-            self.all_tilts(stage, &intersections, &arrived, &receiver)
+        let tilt_sd_rad = self.received().tilt_sd_rad;
+        let tilts = if tilt_sd_rad > 0.0 {
+            self.all_tilts(stage, intersections, &arrived, tilt_sd_rad)
         } else {
             Vec::new()
         };
-        // Effects on all shots together come last.
+        Echoes { arrived, tilts }
+    }
+
+    /// The prediction from the echoes of all shots, on which effects on all of them together act last.
+    fn arrived_together(
+        &self,
+        stage: &Stage,
+        shots: &[Shot],
+        Echoes { mut arrived, tilts }: Echoes,
+        cache: &PredictionCache,
+    ) -> Prediction {
         self.arrive(stage, shots, cache, &mut arrived);
         for echo in arrived.iter_mut().flatten() {
             echo.power_w *= self.level;
         }
+        let receiver = self.received();
         Prediction { arrived, tilts, saturating: receiver.saturating(), receiver }
+    }
+
+    /// f of the scattering models without effects, 1/sr, of all shots.
+    fn all_f_per_sr(&self, stage: &Stage, shots: &[Option<Intersection>]) -> Vec<f64> {
+        let laws = self.retros();
+        in_tasks(shots, |shots| self.f_per_sr(stage, &laws, shots))
+    }
+
+    /// The products of all gains of all shots.
+    fn all_gains(&self, stage: &Stage, shots: &[Option<Intersection>]) -> Vec<f64> {
+        in_tasks(shots, |shots| self.gains(stage, shots))
     }
 
     /// Names and values of the effects for which `holds` is true.
@@ -232,9 +341,9 @@ impl Model<'_> {
         stage: &Stage,
         intersections: &[Option<Intersection>],
         arrived: &[Option<MeanEcho>],
-        receiver: &Receiver,
+        tilt_sd_rad: f64,
     ) -> Vec<Tilts> {
-        let (laws, nodes) = (self.retros(), nodes(receiver.tilt_sd_rad));
+        let (laws, nodes) = (self.retros(), nodes(tilt_sd_rad));
         let tasks =
             intersections.par_chunks(SHOTS_PER_TASK).zip(arrived.par_chunks(SHOTS_PER_TASK));
         let of_task = |(shots, arrived): (&[Option<Intersection>], &[Option<MeanEcho>])| {
@@ -303,7 +412,7 @@ impl Model<'_> {
         let Some(target) = self.target(stage, &shot) else { return Some(shot) };
         let ray = target.inverse() * shot.ray;
         let hit = stage.geometry.bvh.closest(&ray)?;
-        Some(moved(stage, &shot, target, ray, hit).0)
+        Some(moved(&Facet::of(stage, hit.facet as usize), &shot, target, ray, hit).0)
     }
 
     /// The intersections of all shots, traced together: rays of one origin are then rasterised.
@@ -324,7 +433,9 @@ impl Model<'_> {
             .map(|(shot, target, ray, hit)| match *target {
                 None => Some(Intersection::of_shot(stage, shot)),
                 Some(target) => {
-                    let (shot, to_radar) = moved(stage, shot, target, *ray, (*hit)?);
+                    let hit = (*hit)?;
+                    let facet = Facet::of(stage, hit.facet as usize);
+                    let (shot, to_radar) = moved(&facet, shot, target, *ray, hit);
                     Some(Intersection::new(stage, shot, to_radar))
                 }
             })
@@ -452,15 +563,29 @@ impl Model<'_> {
     }
 }
 
+/// A number of each shot, computed for those of a task at once.
+fn in_tasks(
+    shots: &[Option<Intersection>],
+    compute: impl Fn(&[Option<Intersection>]) -> Vec<f64> + Sync,
+) -> Vec<f64> {
+    let mut numbers = vec![0.0; shots.len()];
+    let tasks = numbers.par_chunks_mut(SHOTS_PER_TASK).zip(shots.par_chunks(SHOTS_PER_TASK));
+    tasks.for_each(|(numbers, shots)| numbers.copy_from_slice(&compute(shots)));
+    numbers
+}
+
 /// f of the laws in backscatter without effects, 1/sr, of every shot that hits the target; 0 of any other.
 fn retro_per_sr(stage: &Stage, laws: &[Retro], shots: &[Option<Intersection>]) -> Vec<f64> {
     let mut f_per_sr = vec![0.0; shots.len()];
     for (region, law) in (0..).zip(laws) {
-        let hits = shots.iter().enumerate().filter_map(|(at, shot)| Some((at, shot.as_ref()?)));
-        let (places, looks): (Vec<usize>, Vec<_>) = hits
-            .filter(|(_, hit)| hit.shot.region == region)
-            .map(|(at, hit)| (at, (stage.widening_of_shot_rad(&hit.shot), hit.to_radar)))
-            .unzip();
+        let mut places = Vec::with_capacity(shots.len());
+        let mut looks = Vec::with_capacity(shots.len());
+        for (at, hit) in shots.iter().enumerate() {
+            if let Some(hit) = hit.as_ref().filter(|hit| hit.shot.region == region) {
+                places.push(at);
+                looks.push((stage.widening_of_shot_rad(&hit.shot), hit.to_radar));
+            }
+        }
         for (at, one_per_sr) in places.into_iter().zip(law.per_sr(&looks)) {
             f_per_sr[at] = one_per_sr;
         }

@@ -14,6 +14,11 @@ pub(super) fn placed(middle: DVec3, shift_m: DVec3, turn_deg: DVec3) -> Pose<Glo
     motion(rotation(turn_deg), middle, shift_m)
 }
 
+/// The small motion by a twist.
+pub(super) fn twisted(middle: DVec3, &[x, y, z, roll, pitch, yaw]: &Twist) -> Pose<Global, Global> {
+    placed(middle, DVec3::new(x, y, z), DVec3::new(roll, pitch, yaw))
+}
+
 fn rotation(turn_deg: DVec3) -> DMat3 {
     let turn_rad = turn_deg.map(f64::to_radians);
     Pose::<Global, Global>::from_euler_xyz(turn_rad, DVec3::ZERO).rotation()

@@ -28,6 +28,7 @@ impl Local {
     }
 
     /// Adds `first`·j to the gradient and `second`·j·jᵀ to the curvature.
+    #[inline(always)]
     pub fn add(&mut self, first: f64, second: f64, j: &[f64]) {
         if first != 0.0 {
             self.gradient.as_mut_slice().iter_mut().zip(j).for_each(|(sum, a)| *sum += first * a);
@@ -37,6 +38,9 @@ impl Local {
             let columns = self.curvature.as_mut_slice().chunks_exact_mut(j.len().max(1));
             for (column, a) in columns.zip(j) {
                 let by = second * a;
+                if by == 0.0 {
+                    continue;
+                }
                 column.iter_mut().zip(j).for_each(|(sum, b)| *sum += by * b);
             }
         }
