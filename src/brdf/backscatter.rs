@@ -10,7 +10,7 @@
 use std::f64::consts::PI;
 
 use super::slopes::{Distribution, VIEWING_RAD, beckmann, narrow_ggx, wide_ggx};
-use crate::lanes::{exp, ln};
+use crate::lanes::{Wide, exp, ln, widest};
 
 /// A look straight back at a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -97,6 +97,13 @@ impl Term {
         f_per_sr[0]
     }
 
+    /// As [`per_sr`](Self::per_sr), of each look, in vector instructions.
+    pub(crate) fn per_sr_of_each(&self, looks: &[Look]) -> Vec<f64> {
+        let mut f_per_sr = vec![0.0; looks.len()];
+        widest(Sum { terms: std::slice::from_ref(self), looks, f_per_sr: &mut f_per_sr });
+        f_per_sr
+    }
+
     /// Adds its part of f, 1/sr, of each look.
     #[inline(always)]
     pub(super) fn add_per_sr(&self, looks: &[Look], f_per_sr: &mut [f64]) {
@@ -150,6 +157,24 @@ impl Term {
         };
         let part = self.level_per_sr * PI * density * power * shadowing;
         if cos_theta > GRAZING { part } else { 0.0 }
+    }
+}
+
+/// The sum of terms for many looks.
+pub(super) struct Sum<'a> {
+    pub terms: &'a [Term],
+    pub looks: &'a [Look],
+    pub f_per_sr: &'a mut [f64],
+}
+
+impl Wide for Sum<'_> {
+    type Answer = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for term in self.terms {
+            term.add_per_sr(self.looks, self.f_per_sr);
+        }
     }
 }
 

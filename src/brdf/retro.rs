@@ -1,6 +1,6 @@
 //! A law that is asked for backscatter only: by its closed form in vector instructions, where it has one.
 
-use super::backscatter::{GRAZING, Look, Term};
+use super::backscatter::{GRAZING, Look, Sum, Term};
 use super::scattering::{Scattering, Seen};
 use crate::frames::{Direction, Surface};
 use crate::lanes::{Wide, widest};
@@ -111,24 +111,6 @@ impl Wide for Split<'_> {
 fn add(sums: &mut [f64], parts: &[f64]) {
     for (sum, part) in sums.iter_mut().zip(parts) {
         *sum += part;
-    }
-}
-
-/// The sum of terms for many looks.
-struct Sum<'a> {
-    terms: &'a [Term],
-    looks: &'a [Look],
-    f_per_sr: &'a mut [f64],
-}
-
-impl Wide for Sum<'_> {
-    type Answer = ();
-
-    #[inline(always)]
-    fn run(self) {
-        for term in self.terms {
-            term.add_per_sr(self.looks, self.f_per_sr);
-        }
     }
 }
 

@@ -104,12 +104,10 @@ impl SpotRay {
         let beam_rad = stage.widening_rad(region, divergence_rad);
         SpotRay { range_m, to_radar, watts_per_f, region, number, beam_rad, divergence_rad }
     }
-
-    /// Its power, W, from one region with an f of a beam's divergence, rad, and a direction, 1/sr.
-    fn power_w(&self, region: u16, f: impl Fn(f64, Direction<Surface>) -> f64) -> f64 {
-        if self.region == region { self.watts_per_f * f(self.beam_rad, self.to_radar) } else { 0.0 }
-    }
 }
+
+/// The divergence of a beam, rad, and the direction back along it.
+type Asked = (f64, Direction<Surface>);
 
 /// The ray of a shot and those of its spot, as far as they hit the target as the scene has it.
 type Spot = (SpotRay, Vec<SpotRay>);
@@ -145,22 +143,32 @@ struct Sums {
 }
 
 impl Sums {
-    /// Of a region's rays by their weights, for f, 1/sr, and its coherent share of a beam's divergence, rad, and a direction.
+    /// Of a region's rays by their weights, for f, 1/sr, of many beams at once, and the coherent share of one.
     fn of(
         (centre, spot): &Spot,
         weights: &[f64; RAYS],
         region: u16,
-        f: impl Fn(f64, Direction<Surface>) -> f64,
+        f_per_sr: impl Fn(&[Asked]) -> Vec<f64>,
         coherent_share: impl Fn(f64, Direction<Surface>) -> f64,
     ) -> Sums {
-        let mut sums = Sums { centre_w: centre.power_w(region, &f), ..Sums::default() };
-        for ray in spot {
-            let weight = weights[usize::from(ray.number)];
-            if weight == 0.0 {
-                continue;
+        let mut rays = Vec::with_capacity(RAYS + 1);
+        let mut asked = Vec::with_capacity(RAYS + 1);
+        let of_spot = spot.iter().map(|ray| (weights[usize::from(ray.number)], ray));
+        for (weight, ray) in [(1.0, centre)].into_iter().chain(of_spot) {
+            if weight != 0.0 && ray.region == region {
+                rays.push((weight, ray));
+                asked.push((ray.beam_rad, ray.to_radar));
             }
-            let (power_w, longer_m) =
-                (weight * ray.power_w(region, &f), ray.range_m - centre.range_m);
+        }
+        let f_per_sr = f_per_sr(&asked);
+        let mut powers =
+            rays.iter().zip(f_per_sr).map(|((weight, ray), f)| (weight * (ray.watts_per_f * f), ray));
+        let mut sums = Sums::default();
+        if centre.region == region {
+            sums.centre_w = powers.next().map_or(0.0, |(power_w, _)| power_w);
+        }
+        for (power_w, ray) in powers {
+            let longer_m = ray.range_m - centre.range_m;
             sums.power_w += power_w;
             sums.first += power_w * longer_m;
             sums.second += power_w * longer_m * longer_m;
@@ -207,7 +215,10 @@ impl ShadedSpots {
                     self.spots.sums(
                         diameter,
                         region,
-                        |beam_rad, v| law.seen_by(beam_rad, v, v).f_per_sr,
+                        |asked| {
+                            let seen = asked.iter().map(|&(beam_rad, v)| law.seen_by(beam_rad, v, v));
+                            seen.map(|seen| seen.f_per_sr).collect()
+                        },
                         |beam_rad, v| law.seen_by(beam_rad, v, v).coherent_share,
                     )
                 });
@@ -220,7 +231,10 @@ impl ShadedSpots {
                     self.spots.sums(
                         diameter,
                         region,
-                        |beam_rad, v| shape.per_sr(Look { beam_rad, cos_theta: v.cos_theta() }),
+                        |asked| {
+                            let looks = asked.iter().map(|&(beam_rad, v)| Look { beam_rad, cos_theta: v.cos_theta() });
+                            shape.per_sr_of_each(&looks.collect::<Vec<_>>())
+                        },
                         |beam_rad, _| shape.coherent_share(beam_rad),
                     )
                 });
@@ -232,13 +246,12 @@ impl ShadedSpots {
 }
 
 impl Spots {
-    /// The sums of every spot over the rays of a region, for f, 1/sr, and its coherent share of a beam's divergence, rad, and a
-    /// direction.
+    /// The sums of every spot over the rays of a region, for f, 1/sr, of many beams at once, and the coherent share of one.
     fn sums(
         &self,
         diameter: Diameter,
         region: u16,
-        f: impl Fn(f64, Direction<Surface>) -> f64 + Sync,
+        f_per_sr: impl Fn(&[Asked]) -> Vec<f64> + Sync,
         coherent_share: impl Fn(f64, Direction<Surface>) -> f64 + Sync,
     ) -> Vec<Sums> {
         let common = match diameter {
@@ -249,7 +262,7 @@ impl Spots {
         let sums = spots.map(|(spot, of_beam_m)| {
             let Some(spot) = spot else { return Sums::default() };
             let weights = common.unwrap_or_else(|| weights(*of_beam_m));
-            Sums::of(spot, &weights, region, &f, &coherent_share)
+            Sums::of(spot, &weights, region, &f_per_sr, &coherent_share)
         });
         sums.collect()
     }
