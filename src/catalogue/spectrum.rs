@@ -1,6 +1,6 @@
 //! The permittivity of a material over frequency, as a plot draws it.
 
-use crate::formats::figure::{Plot, Series, Style};
+use crate::formats::figure::{Ink, Plot, Series, Style};
 use crate::formats::words::as_typed;
 use crate::material::{Material, Permittivity};
 
@@ -37,12 +37,12 @@ impl Spectrum {
     }
 }
 
-/// Around everything that is drawn, and zero, with room for the legend.
+/// Around everything that is drawn, and zero.
 fn y_range(spectra: &[Spectrum]) -> Option<(f64, f64)> {
     let drawn = spectra.iter().flat_map(|one| &one.series).flat_map(|series| &series.points);
     let values = drawn.map(|point| point.1);
     let (low, high) = values.fold((0.0_f64, 0.0_f64), |(low, high), y| (low.min(y), high.max(y)));
-    (low < high).then_some((1.04 * low, 1.2 * high))
+    (low < high).then_some((1.04 * low, 1.04 * high))
 }
 
 /// The spectra of a material: of each substance and temperature with at least three frequencies, in the order of the
@@ -57,20 +57,21 @@ pub fn spectra(material: &Material) -> Vec<Spectrum> {
         let is_new = !all[..number].iter().any(|other| is_same(first, other));
         if is_new && rows.len() >= FEWEST {
             rows.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
-            spectra.push(spectrum(first, &rows));
+            spectra.push(spectrum(first, &rows, spectra.len()));
         }
     }
     spectra
 }
 
-/// The spectrum of these rows, lowest frequency first.
-fn spectrum(first: &Permittivity, rows: &[&Permittivity]) -> Spectrum {
+/// The spectrum of these rows, lowest frequency first; `number` is its place among those of the material.
+fn spectrum(first: &Permittivity, rows: &[&Permittivity], number: usize) -> Spectrum {
     let celsius = first.temperature_k.map(|k| format!(" at {} °C", as_typed(k - 273.15)));
     let name = first.key.clone() + &celsius.unwrap_or_default();
     let ghz = |row: &&Permittivity| row.frequency_hz / 1e9;
     let range_ghz = (rows.first().map_or(0.0, ghz), rows.last().map_or(0.0, ghz));
     let mut series = Vec::new();
-    for (part, pick) in PARTS {
+    for (place, (part, pick)) in PARTS.into_iter().enumerate() {
+        let ink = Ink::Own(PARTS.len() * number + place);
         let name = format!("{part} of {name}");
         let points: Vec<_> = rows.iter().map(|row| (ghz(row), pick(row).0)).collect();
         let known = rows.iter().filter_map(|row| {
@@ -83,9 +84,9 @@ fn spectrum(first: &Permittivity, rows: &[&Permittivity]) -> Spectrum {
             let low = known.iter().map(|(x, y, room)| (*x, (y - room).max(y.min(0.0))));
             let high = known.iter().rev().map(|(x, y, room)| (*x, y + room));
             let points = low.chain(high).collect();
-            series.push(Series { name: name.clone(), style: Style::Band, points });
+            series.push(Series { name: name.clone(), style: Style::Band, ink, points });
         }
-        series.push(Series { name, style: Style::Curve, points });
+        series.push(Series { name, style: Style::Curve, ink, points });
     }
     Spectrum { name, range_ghz, source: first.source.clone(), series }
 }

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use super::report::{Estimate, FitReport};
-use crate::brdf::{Brdf, Parameter};
+use crate::brdf::{Brdf, Parameter, ScatteringModel};
 
 /// A scattering model with numbers in it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -60,6 +60,20 @@ impl Lobes {
             Lobes::RadarAndSurface => "lobes of radar and surface together",
             Lobes::Surface => "lobes of the surface alone",
         }
+    }
+
+    /// Whose lobes a law has that was stated with these. A smooth mirror has no lobe of its own, and a law that is one
+    /// says itself whether its width is that of a beam.
+    pub fn of(self, law: &Brdf) -> Lobes {
+        let is_mirror = law.is_smooth() || law.has_smooth_mirror();
+        if is_mirror { Lobes::Surface } else { self }
+    }
+
+    /// Width of a law's narrowest lobe, rad, where its lobes include the beam that saw them, so that no beam widens them
+    /// again; infinite without a lobe. None where its lobes are its own.
+    pub fn seen_lobe_rad(self, law: &Brdf) -> Option<f64> {
+        let includes_beam = self.of(law).is_of_both();
+        includes_beam.then(|| law.lobe_rad(0.0).unwrap_or(f64::INFINITY))
     }
 
     /// Whether they are of radar and surface together.

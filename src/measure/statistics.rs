@@ -83,6 +83,20 @@ pub fn median<'a>(observations: impl Iterator<Item = &'a Observation> + Clone) -
     }
 }
 
+/// Quantiles of the backscatter of points taken together, σ⁰, one for each share, 0 to 1; none where one is only known to
+/// be below a threshold, and of points of which one is above the instrument's range.
+pub fn quantiles<const N: usize>(
+    observations: &[Observation],
+    shares: [f64; N],
+) -> [Option<f64>; N] {
+    if observations.iter().any(|o| o.is_retro() && o.censor == Censor::Right) {
+        return [None; N];
+    }
+    let points = points(observations.iter());
+    let spread = Sample::new(&points).spread(&vec![1; points.len()]);
+    shares.map(|share| spread.quantile(share))
+}
+
 /// A point of a bin.
 #[derive(Clone, Copy)]
 struct Point {

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::json::json_file;
 use crate::error::Error;
-use crate::formats::figure::{Figure, Plot, Scale, Series, Style, beside};
+use crate::formats::figure::{Figure, Ink, Plot, Scale, Series, Style, beside};
 use crate::geometry::Raster;
 use crate::measure::Cloud;
 use crate::measure::compare::{Agreement, Line, difference, measured_scan, power_along};
@@ -99,17 +99,19 @@ impl Comparison {
 
     /// The powers of both along a stripe of the global frame.
     pub fn line_plot(&self, line: Line) -> Plot<'_> {
-        let series =
-            [("measured", &self.measured), ("simulated", &self.simulated)].map(|(name, scan)| {
-                Series {
-                    name: format!("{name}, y = {} ± {} m", line.y_m, 0.5 * line.width_m),
-                    style: Style::Points,
-                    points: power_along(scan, line)
-                        .into_iter()
-                        .map(|(x_m, power_w)| (x_m, dbm_from_watts(power_w)))
-                        .collect(),
-                }
-            });
+        let scans = [
+            ("measured", Ink::Detections, &self.measured),
+            ("simulated", Ink::Before, &self.simulated),
+        ];
+        let series = scans.map(|(name, ink, scan)| Series {
+            name: format!("{name}, y = {} ± {} m", line.y_m, 0.5 * line.width_m),
+            style: Style::Points,
+            ink,
+            points: power_along(scan, line)
+                .into_iter()
+                .map(|(x_m, power_w)| (x_m, dbm_from_watts(power_w)))
+                .collect(),
+        });
         let is_empty = series.iter().all(|series| series.points.is_empty());
         Plot {
             title: &self.title,

@@ -3,7 +3,7 @@
 
 use super::material_plot::{FAINTEST_DB, curve_points, fit_layers, incidence_plot};
 use crate::brdf::ThroughBeam;
-use crate::formats::figure::{Plot, Series, Style};
+use crate::formats::figure::{Ink, Plot, Series, Style};
 use crate::formats::words::significant;
 use crate::material::{Aspect, Fit, Observation};
 use crate::units::db_from_ratio;
@@ -28,7 +28,8 @@ impl FitPlot {
     pub fn new(title: String, curve: &str, rows: &[Observation], fit: &Fit) -> Option<FitPlot> {
         if rows.iter().all(Observation::is_retro) {
             let subtitle = format!("{}, with its 95 % band", fit.name);
-            let series = fit_layers(std::slice::from_ref(fit), curve_points(curve, rows));
+            let points = curve_points(curve, rows, Ink::Detections);
+            let series = fit_layers(std::slice::from_ref(fit), points);
             return Some(FitPlot { title, subtitle, series, has_pairs: false });
         }
         let scans = scans(rows);
@@ -40,8 +41,10 @@ impl FitPlot {
         longest.sort_by_key(|(_, scan)| std::cmp::Reverse(scan.len()));
         longest.truncate(MOST_INCIDENCES);
         longest.sort_by(|(a, _), (b, _)| a.total_cmp(b));
-        let series = longest.iter().flat_map(|(incidence, scan)| layers(*incidence, scan, fit));
-        let series: Vec<Series> = series.collect();
+        let mut series = Vec::new();
+        for (number, (incidence, scan)) in longest.iter().enumerate() {
+            series.extend(layers(*incidence, scan, fit, Ink::Own(number)));
+        }
         (!series.is_empty()).then_some(FitPlot { title, subtitle, series, has_pairs: true })
     }
 
@@ -74,7 +77,7 @@ fn scans(rows: &[Observation]) -> Vec<(f64, Scan<'_>)> {
 }
 
 /// What was measured at one angle of incidence, and the fit in dashes.
-fn layers(incidence_rad: f64, scan: &Scan, fit: &Fit) -> Vec<Series> {
+fn layers(incidence_rad: f64, scan: &Scan, fit: &Fit, ink: Ink) -> Vec<Series> {
     let name = format!("incidence {}°", significant(incidence_rad.to_degrees(), 4));
     let (mut seen, mut below) = (Vec::new(), Vec::new());
     for (theta_s_rad, row) in scan {
@@ -91,13 +94,14 @@ fn layers(incidence_rad: f64, scan: &Scan, fit: &Fit) -> Vec<Series> {
         (theta_s_deg, if f_db >= FAINTEST_DB { f_db } else { f64::NAN })
     });
     let mut layers = vec![
-        Series { name: name.clone(), style: Style::Points, points: seen },
-        Series { name: name.clone(), style: Style::Beyond, points: fitted.collect() },
+        Series { name: name.clone(), style: Style::Points, ink, points: seen },
+        Series { name: name.clone(), style: Style::Beyond, ink, points: fitted.collect() },
     ];
     if !below.is_empty() {
         layers.push(Series {
             name: format!("{name}, below this"),
             style: Style::Below,
+            ink,
             points: below,
         });
     }

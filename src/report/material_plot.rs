@@ -7,7 +7,7 @@ use crate::brdf::{
 };
 use crate::error::Error;
 use crate::fit::stored_band;
-use crate::formats::figure::{FigureError, Plot, Series, Style};
+use crate::formats::figure::{FigureError, Ink, Plot, Series, Style};
 use crate::material::{Censor, Fit, Material, Observation, Reach};
 use crate::units::db_from_ratio;
 
@@ -57,14 +57,7 @@ impl FigureFormat {
 /// A plot over the angle of incidence, degrees, of σ⁰, dB.
 pub fn incidence_plot<'a>(title: &'a str, subtitle: &'a str, series: Vec<Series>) -> Plot<'a> {
     Plot {
-        title,
-        subtitle,
-        x_label: "incidence, °",
-        y_label: "σ⁰, dB",
-        x_range: Some((0.0, 90.0)),
-        y_range: None,
-        equal: false,
-        series,
+        title, subtitle, x_label: "incidence, °", y_label: "σ⁰, dB", series, ..Plot::default()
     }
 }
 
@@ -74,12 +67,15 @@ pub fn incidence_plot<'a>(title: &'a str, subtitle: &'a str, series: Vec<Series>
 /// A material that renders nothing.
 pub fn material_plot(material: &Material) -> Result<Vec<Series>, Error> {
     let mut points = Vec::new();
-    for curve in &material.curves {
-        points.extend(curve_points(&curve.name, &curve.observations));
+    for (number, curve) in material.curves.iter().enumerate() {
+        // Several curves are told apart by colours of their own, beyond those of the fits.
+        let is_alone = material.curves.len() == 1;
+        let ink = if is_alone { Ink::Detections } else { Ink::Own(material.fits.len() + number) };
+        points.extend(curve_points(&curve.name, &curve.observations, ink));
     }
     let mut series = fit_layers(&material.fits, points);
     if material.fits.is_empty() {
-        series.push(model_curve("rendered", &material.scattering()?));
+        series.push(model_curve("rendered", &material.scattering()?, Ink::Own(0)));
     }
     Ok(series.into_iter().flat_map(|series| split_at_reach(material, series)).collect())
 }
@@ -95,7 +91,7 @@ pub fn sweep_plot(material: &Material, sweep: &str) -> Result<Vec<Series>, Error
         return Err(Error::usage(format!("`{sweep}` names no values"), way_out));
     };
     let mut series = Vec::new();
-    for text in values.split(',').map(str::trim) {
+    for (number, text) in values.split(',').map(str::trim).enumerate() {
         let Ok(value) = text.parse() else {
             return Err(Error::usage(
                 format!("`{text}` is not a number"),
@@ -113,7 +109,8 @@ pub fn sweep_plot(material: &Material, sweep: &str) -> Result<Vec<Series>, Error
         if let Err(error) = model.validate() {
             return Err(Error::usage(error.to_string(), "leave it out of the sweep"));
         }
-        series.extend(split_at_reach(material, model_curve(&format!("{path} = {text}"), &model)));
+        let curve = model_curve(&format!("{path} = {text}"), &model, Ink::Own(number));
+        series.extend(split_at_reach(material, curve));
     }
     Ok(series)
 }
@@ -143,13 +140,15 @@ pub fn appendix_figures() -> Result<Vec<(String, Vec<u8>)>, Error> {
         (19, "diffuse", "alpha", [1.0, 3.0, 10.0]),
     ] {
         let mut series = Vec::new();
-        for value in values {
+        for (number, value) in values.into_iter().enumerate() {
             let mut model = base.clone();
             model.set_parameter(&format!("{part}.{name}"), value);
-            series.push(model_curve(&format!("{name} = {value}"), &model));
+            series.push(model_curve(&format!("{name} = {value}"), &model, Ink::Own(number)));
         }
         let title = format!("Influence of {name}");
-        let plot = Plot { y_range: Some((-70.0, 30.0)), ..incidence_plot(&title, "", series) };
+        let x_range = Some((0.0, 90.0));
+        let plot = incidence_plot(&title, "", series);
+        let plot = Plot { x_range, y_range: Some((-70.0, 30.0)), ..plot };
         files.push((format!("figure-{number}.png"), plot.png()?));
         files.push((format!("figure-{number}.svg"), plot.svg()?.into_bytes()));
     }
@@ -158,17 +157,20 @@ pub fn appendix_figures() -> Result<Vec<(String, Vec<u8>)>, Error> {
 
 /// Bands of fits below points below curves of fits, so that each can be seen.
 pub fn fit_layers(fits: &[Fit], points: Vec<Series>) -> Vec<Series> {
-    let curves = fits.iter().map(|fit| {
+    let numbered = || fits.iter().enumerate();
+    let curves = numbered().map(|(number, fit)| {
         // As the beam of the points sees it.
         let beam_rad = fit.beam_rad().unwrap_or(0.0);
-        model_curve(&fit.name, &ThroughBeam { law: &fit.model, beam_rad })
+        let seen = ThroughBeam { law: &fit.model, beam_rad };
+        model_curve(&fit.name, &seen, Ink::Own(number))
     });
-    fits.iter().filter_map(band).chain(points).chain(curves).collect()
+    let bands = numbered().filter_map(|(number, fit)| band(fit, Ink::Own(number)));
+    bands.chain(points).chain(curves).collect()
 }
 
 /// The backscatter points of a curve: detections, and in series of their own the thresholds of what was not
 /// detected and of what was above the instrument's range.
-pub fn curve_points(name: &str, observations: &[Observation]) -> Vec<Series> {
+pub fn curve_points(name: &str, observations: &[Observation], ink: Ink) -> Vec<Series> {
     let (mut seen, mut below, mut above) = (Vec::new(), Vec::new(), Vec::new());
     for row in observations.iter().filter(|row| row.is_retro()) {
         let (points, sigma0) = match (row.sigma0, row.threshold_sigma0, row.censor) {
@@ -179,11 +181,12 @@ pub fn curve_points(name: &str, observations: &[Observation]) -> Vec<Series> {
         };
         points.push((row.theta_i_rad.to_degrees(), db_from_ratio(sigma0)));
     }
-    let mut series = vec![Series { name: name.to_owned(), style: Style::Points, points: seen }];
+    let mut series =
+        vec![Series { name: name.to_owned(), style: Style::Points, ink, points: seen }];
     for (points, style, side) in [(below, Style::Below, "below"), (above, Style::Above, "above")] {
         if !points.is_empty() {
             let name = format!("{name}, {side} the threshold here");
-            series.push(Series { name, style, points });
+            series.push(Series { name, style, ink, points });
         }
     }
     series
@@ -213,13 +216,13 @@ fn split_at_reach(material: &Material, series: Series) -> Vec<Series> {
         beyond.push((theta_deg, if around.contains(&true) { level_db } else { f64::NAN }));
     }
     vec![
-        Series { name: series.name.clone(), style: Style::Beyond, points: beyond },
-        Series { name: series.name, style: Style::Curve, points: within },
+        Series { name: series.name.clone(), style: Style::Beyond, points: beyond, ..series },
+        Series { points: within, ..series },
     ]
 }
 
 /// The 95 % band of a fit that has a report.
-fn band(fit: &Fit) -> Option<Series> {
+fn band(fit: &Fit, ink: Ink) -> Option<Series> {
     let beam_rad = fit.beam_rad().unwrap_or(0.0);
     let (mut low, mut high) = (Vec::new(), Vec::new());
     for step in 0..900u32 {
@@ -234,16 +237,16 @@ fn band(fit: &Fit) -> Option<Series> {
     }
     let outline: Vec<(f64, f64)> = low.into_iter().chain(high.into_iter().rev()).collect();
     let is_empty = outline.is_empty();
-    (!is_empty).then(|| Series { name: fit.name.clone(), style: Style::Band, points: outline })
+    (!is_empty).then(|| Series { name: fit.name.clone(), style: Style::Band, ink, points: outline })
 }
 
 /// σ⁰ in dB every tenth of a degree: the lobe of a smooth surface needs that many.
-fn model_curve(name: &str, model: &dyn Scattering) -> Series {
+fn model_curve(name: &str, model: &dyn Scattering, ink: Ink) -> Series {
     let mut points = Vec::new();
     for step in 0..900u32 {
         let theta_deg = f64::from(step) / 10.0;
         let level_db = db_from_ratio(model.sigma0(theta_deg.to_radians()));
         points.push((theta_deg, if level_db >= FAINTEST_DB { level_db } else { f64::NAN }));
     }
-    Series { name: name.to_owned(), style: Style::Curve, points }
+    Series { name: name.to_owned(), style: Style::Curve, ink, points }
 }

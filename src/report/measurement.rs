@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::json::json_file;
 use crate::effects::{Setting, find};
 use crate::error::Error;
-use crate::formats::figure::{Plot, Series, Style};
+use crate::formats::figure::{Ink, Plot, Series, Style};
 use crate::measure::freedom::Freedom;
 use crate::measure::{Cloud, Curve, Reduction, ReductionResult, Registration, RegistrationResult};
 use crate::scene::Scene;
@@ -179,17 +179,21 @@ fn measured_curve_plot<'a>(title: &'a str, curve: &Curve) -> Plot<'a> {
         let points = if row.is_censored() { &mut silent } else { &mut detected };
         points.push((row.theta_i_rad.to_degrees(), db_from_ratio(sigma0)));
     }
-    let series = [("not detected, below", silent), ("detected", detected)];
+    let series =
+        [("not detected, below", Style::Below, silent), ("detected", Style::Points, detected)];
     Plot {
         title,
         subtitle: "measured cloud, reduced by equation (8)",
         x_label: "incidence, °",
         y_label: "σ⁰, dB",
-        x_range: Some((0.0, 90.0)),
-        y_range: None,
-        equal: false,
         series: series
-            .map(|(name, points)| Series { name: name.to_owned(), style: Style::Points, points })
+            .map(|(name, style, points)| Series {
+                name: name.to_owned(),
+                style,
+                ink: Ink::Detections,
+                points,
+            })
             .into(),
+        ..Plot::default()
     }
 }

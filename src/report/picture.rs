@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::error::Error;
 use crate::formats::figure::drawing::Drawing;
-use crate::formats::figure::{FigureError, Series, Style};
+use crate::formats::figure::{FigureError, Ink, Series, Style};
 
 /// One picture: a file for a paper, and panels that a page can put below each other.
 pub struct Picture {
@@ -61,5 +61,5 @@ pub(super) fn guide(name: &str, [from, to]: [f64; 2], y: impl Fn(f64) -> f64) ->
         let x = from + (to - from) * f64::from(step) / f64::from(STEPS);
         points.push((x, y(x)));
     }
-    Series { name: name.to_owned(), style: Style::Guide, points }
+    Series { name: name.to_owned(), style: Style::Guide, ink: Ink::Own(0), points }
 }

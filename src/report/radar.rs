@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use crate::error::Error;
-use crate::formats::figure::{Figure, Plot, Scale, Series, Style};
+use crate::formats::figure::{Figure, Ink, Plot, Scale, Series, Style};
 use crate::formats::words::significant;
 use crate::geometry::Raster;
 use crate::geometry::raster::Channel;
@@ -110,7 +110,12 @@ fn scan_plot<'a>(radar: &'a Radar, chirps: &Chirps, field: Field, title: &'a str
         x_range,
         y_range,
         equal: true,
-        series: vec![Series { name: String::new(), style: Style::Points, points }],
+        series: vec![Series {
+            name: String::new(),
+            style: Style::Points,
+            ink: Ink::Own(0),
+            points,
+        }],
     }
 }
 

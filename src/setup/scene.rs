@@ -68,15 +68,12 @@ const INDEPENDENT_ANTENNAS: &str = "radar.speckle.form = \"law\" gives every ant
 impl SceneMaterial {
     /// Width of its narrowest lobe, rad, where its lobes include the beam that saw them; infinite without a lobe.
     fn seen_lobe_rad(&self) -> Option<f64> {
-        let includes_beam = self.rendered_lobes().is_of_both();
-        includes_beam.then(|| self.scattering.lobe_rad(0.0).unwrap_or(f64::INFINITY))
+        self.lobes.seen_lobe_rad(&self.scattering)
     }
 
-    /// Whose lobes its law has. A smooth mirror has no lobe of its own, and a law that is one says itself whether its width
-    /// is that of a beam.
+    /// Whose lobes its law has.
     pub fn rendered_lobes(&self) -> Lobes {
-        let is_mirror = self.scattering.is_smooth() || self.scattering.has_smooth_mirror();
-        if is_mirror { Lobes::Surface } else { self.lobes }
+        self.lobes.of(&self.scattering)
     }
 
     /// The curve that is rendered, or that the rendered law belongs to.

@@ -10,7 +10,7 @@ use super::quantity::quantity;
 use super::words::grouped;
 use crate::brdf::ThroughBeam;
 use crate::fit::stored_band;
-use crate::formats::figure::{Series, Style};
+use crate::formats::figure::{Ink, Series, Style};
 use crate::formats::words::{digits, percent};
 use crate::material::{Censor, Curve, Fit, Instrument, Material, Observation, SourceKind};
 use crate::units::{db_from_ratio, dbm_from_watts};
@@ -74,7 +74,7 @@ pub(super) fn picture(material: &Material) -> (Option<String>, Vec<Sample>) {
         let class = format!("{} is-{}", ink(curves + number), line_word(material, fit));
         // Next to its curve a fit is drawn as the beam of the curve sees it.
         let seen = ThroughBeam { law: &fit.model, beam_rad: material.beam_rad(fit) };
-        series.extend(lines(&Levels::stated(material, &seen), &class));
+        series.extend(lines(&fit.name, &Levels::stated(material, &seen), &class));
         samples.push(Sample {
             name: fit.name.clone(),
             kind: word(kind_of(material, &fit.source)),
@@ -91,8 +91,8 @@ pub(super) fn picture(material: &Material) -> (Option<String>, Vec<Sample>) {
         && let Ok(model) = material.scattering()
     {
         let class = format!("{} {}", ink(number), class_of(material.render_kind()));
-        series.extend(lines(&Levels::rendered(material, &model), &class));
         let name = "between the points".to_owned();
+        series.extend(lines(&name, &Levels::rendered(material, &model), &class));
         let kind = word(material.render_kind());
         samples.push(Sample { name, kind, kind_words: None, shape: "line", class, note: "" });
     }
@@ -101,16 +101,18 @@ pub(super) fn picture(material: &Material) -> (Option<String>, Vec<Sample>) {
         title: format!("Backscatter of {}", material.name),
         description: description(material),
         y_label: "σ⁰, dB",
+        y_range: None,
         series,
     };
     (picture.svg(material), samples)
 }
 
 /// The unbroken pieces of a model's curve.
-fn lines(levels: &Levels, class: &str) -> Vec<(String, Series)> {
+fn lines(name: &str, levels: &Levels, class: &str) -> Vec<(String, Series)> {
     let mut lines = Vec::new();
     for points in levels.line() {
-        let line = Series { name: String::new(), style: Style::Curve, points };
+        let (name, ink) = (name.to_owned(), Ink::Own(0));
+        let line = Series { name, style: Style::Curve, ink, points };
         lines.push((class.to_owned(), line));
     }
     lines
@@ -185,8 +187,9 @@ fn points(
             Style::Above => ("above", "beyond the instrument: the value lies above"),
             _ => ("dots", "detections"),
         };
-        drawn.push((class.clone(), Series { name: String::new(), style, points }));
-        let (name, class) = (curve.name.clone(), class.clone());
+        let (name, ink) = (curve.name.clone(), Ink::Detections);
+        drawn.push((class.clone(), Series { name: name.clone(), style, ink, points }));
+        let class = class.clone();
         samples.push(Sample { name, kind: word(kind), kind_words: None, shape, class, note });
     }
     (drawn, samples)
@@ -207,7 +210,8 @@ fn band(material: &Material, fit: &Fit) -> Option<Series> {
     }
     // Along the lower end and back along the upper one.
     points.extend(upper.into_iter().rev());
-    (points.len() > 2).then(|| Series { name: String::new(), style: Style::Band, points })
+    let (name, ink) = (String::new(), Ink::Own(0));
+    (points.len() > 2).then_some(Series { name, style: Style::Band, ink, points })
 }
 
 /// A curve in words.

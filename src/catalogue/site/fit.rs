@@ -35,7 +35,8 @@ pub(super) struct FitView {
     products: Vec<ProductView>,
     has_values: bool,
     report: Option<ReportView>,
-    residuals: Option<String>,
+    /// Their drawing and what it says of itself.
+    residuals: Option<(String, &'static str)>,
 }
 
 /// A line of the table of parameters.

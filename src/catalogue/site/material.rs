@@ -10,6 +10,8 @@ use super::fit::{self, FitView};
 use super::levels::{Levels, TABLE_DEG, range_deg};
 use super::link::{self, Link};
 use super::script::inert;
+use super::snippet::{self, Snippet};
+use super::sphere;
 use super::words::{gaps, meaning};
 use crate::catalogue::about::About;
 use crate::effects;
@@ -31,6 +33,7 @@ pub(super) struct Page<'a> {
     revision: u32,
     content_hash: &'a str,
     added_at: &'a str,
+    sphere: Option<String>,
     picture: Option<String>,
     samples: Vec<Sample>,
     levels: Vec<(String, String)>,
@@ -41,6 +44,7 @@ pub(super) struct Page<'a> {
     sources: Vec<SourceView<'a>>,
     gaps: Vec<String>,
     validity: [String; 2],
+    snippet: Option<Snippet>,
     citation: &'a Citation,
     record: String,
     history: &'a [RevisionSummary],
@@ -104,6 +108,7 @@ pub(super) fn page<'a>(
         revision: stored.revision,
         content_hash: &stored.content_hash,
         added_at: &stored.added_at,
+        sphere: sphere::svg(material),
         picture,
         samples,
         levels: levels(material),
@@ -114,6 +119,7 @@ pub(super) fn page<'a>(
         sources: material.sources.iter().map(source).collect(),
         gaps: unknown(material),
         validity: validity(material),
+        snippet: snippet::of(stored),
         citation,
         record: inert(&citation.record),
         history,

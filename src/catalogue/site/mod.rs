@@ -18,7 +18,9 @@ mod picture;
 mod quantity;
 mod residuals;
 mod script;
+mod snippet;
 mod spectra;
+mod sphere;
 mod table;
 mod words;
 
@@ -48,10 +50,11 @@ const TEMPLATES: [(&str, &str); 6] = [
 ];
 
 /// What every page needs besides its own.
-const ASSETS: [(&str, &str); 5] = [
+const ASSETS: [(&str, &str); 6] = [
     ("assets/style.css", include_str!("assets/style.css")),
     ("assets/index.js", include_str!("assets/index.js")),
     ("assets/compare.js", include_str!("assets/compare.js")),
+    ("assets/plot.js", include_str!("assets/plot.js")),
     ("assets/material.js", include_str!("assets/material.js")),
     ("assets/icon.svg", include_str!("assets/icon.svg")),
 ];

@@ -1,8 +1,13 @@
 //! Levels over the angle of incidence, drawn for a page.
 
 use super::levels::range_deg;
-use crate::formats::figure::{Inline, Plot, Series, Style};
+use crate::formats::figure::{Inline, Plot, Series};
 use crate::material::Material;
+
+/// Least room above and below the data, dB, so that rounding is not shown as structure.
+const LEAST_ROOM_DB: f64 = 1.0;
+/// Room right of the last angle, °.
+const ROOM_DEG: f64 = 2.0;
 
 /// A picture over the angle of incidence, °.
 pub(super) struct Picture<'a> {
@@ -14,6 +19,8 @@ pub(super) struct Picture<'a> {
     pub(super) description: String,
     /// Quantity and unit upwards.
     pub(super) y_label: &'a str,
+    /// Least and greatest level; around the data if `None`.
+    pub(super) y_range: Option<(f64, f64)>,
     /// What is drawn, the first lowest, each with its classes of the style: ink and kind.
     pub(super) series: Vec<(String, Series)>,
 }
@@ -22,31 +29,24 @@ impl Picture<'_> {
     /// The drawing; none when there is nothing finite to draw.
     pub(super) fn svg(self, material: &Material) -> Option<String> {
         let (classes, series): (Vec<String>, Vec<Series>) = self.series.into_iter().unzip();
-        let plot = Plot {
+        let claimed = range_deg(material);
+        let mut plot = Plot {
             title: &self.title,
             x_label: "angle of incidence, °",
             y_label: self.y_label,
-            x_range: Some((0.0, 90.0)),
-            y_range: Some(level_range_db(&series)?),
             series,
             ..Plot::default()
         };
-        let [least_deg, most_deg] = range_deg(material);
+        let last_deg = plot.x_span()?.1.max(claimed[1]);
+        plot.x_range = Some((0.0, (last_deg + ROOM_DEG).min(90.0)));
+        let (low_db, high_db) = self.y_range.or_else(|| plot.y_span())?;
+        plot.y_range = Some((low_db - LEAST_ROOM_DB, high_db + LEAST_ROOM_DB));
         let page = Inline {
             id: &self.id,
             description: &self.description,
-            claimed: (least_deg, most_deg),
+            claimed: (claimed[0], claimed[1]),
             classes: &classes,
         };
         plot.inline_svg(&page).ok()
     }
-}
-
-/// Around everything but bands, which may reach far; with so much room that rounding is not shown as structure.
-fn level_range_db(series: &[Series]) -> Option<(f64, f64)> {
-    let drawn = series.iter().filter(|series| series.style != Style::Band);
-    let levels = drawn.flat_map(|s| &s.points).map(|p| p.1).filter(|level| level.is_finite());
-    let (low, high) = (levels.clone().reduce(f64::min)?, levels.reduce(f64::max)?);
-    let room = (0.06 * (high - low)).max(1.0);
-    Some((low - room, high + room))
 }

@@ -8,6 +8,11 @@ use super::style::{
 };
 use super::ticks::{Tick, ticks};
 
+/// Fewest ticks of an axis with room for them.
+const FEWEST_TICKS: usize = 4;
+/// So many wanted ticks are at least [`FEWEST_TICKS`]: a step is rounded up by a factor of 2.5 at most.
+const SURELY_ENOUGH: usize = 10;
+
 /// One axis: its quantity with its unit, and the values at its two ends.
 #[derive(Clone, Copy)]
 pub(super) struct Axis<'a> {
@@ -26,6 +31,18 @@ impl Axis<'_> {
     fn share(&self, value: f64) -> f32 {
         ((value - self.low) / (self.high - self.low)) as f32
     }
+}
+
+/// About the wanted number of ticks, and at least four where that many are wanted.
+fn four_ticks(axis: &Axis, wanted: usize) -> Vec<Tick> {
+    let mut found = ticks(axis.low, axis.high, wanted);
+    for more in wanted..SURELY_ENOUGH {
+        if wanted < FEWEST_TICKS || found.len() >= FEWEST_TICKS {
+            break;
+        }
+        found = ticks(axis.low, axis.high, more + 1);
+    }
+    found
 }
 
 /// Data area and heading of a page, px.
@@ -62,7 +79,7 @@ impl<'a> Axes<'a> {
         Axes { title, subtitle, left, top, ..bare }
     }
 
-    /// A data area without a heading, whose axes have about the wanted numbers of ticks.
+    /// A data area without a heading, whose axes have about the wanted numbers of ticks, and at least four where those are wanted.
     pub fn bare(
         [x, y]: [Axis<'a>; 2],
         [left, top, data_width, data_height]: [f32; 4],
@@ -71,8 +88,8 @@ impl<'a> Axes<'a> {
         Axes {
             x,
             y,
-            x_ticks: ticks(x.low, x.high, x_wanted),
-            y_ticks: ticks(y.low, y.high, y_wanted),
+            x_ticks: four_ticks(&x, x_wanted),
+            y_ticks: four_ticks(&y, y_wanted),
             title: Vec::new(),
             subtitle: Vec::new(),
             left,

@@ -3,8 +3,10 @@
 use super::axes::{Axes, Axis};
 use super::drawing::{Anchor, Drawing, Rgb, Shape, Weight, text_width_px};
 use super::error::FigureError;
+use super::ink::Ink;
 use super::style::{
-    DIGIT_HEIGHT, GAP_PX, LINE_SPACING, MARGIN_PX, PALETTE, STROKE_PX, TICK_LABEL_PX, TICK_PX, text,
+    DIGIT_HEIGHT, GAP_PX, LINE_SPACING, MARGIN_PX, QUIET_INK, STROKE_PX, TICK_LABEL_PX, TICK_PX,
+    text,
 };
 
 /// Width of the data area, px.
@@ -13,7 +15,7 @@ const DATA_WIDTH_PX: f32 = 700.0;
 const ROW_PX: f32 = 40.0;
 /// Share of that height that is bar.
 const BAR_SHARE: f32 = 0.62;
-/// Bars that are not picked out.
+/// Bars without a meaning.
 const QUIET: Rgb = [170, 170, 170];
 /// The page itself.
 const PAGE: Rgb = [255, 255, 255];
@@ -42,8 +44,8 @@ pub struct Bar<'a> {
     pub value: f64,
     /// What is written behind it, such as the value.
     pub note: String,
-    /// Picked out by colour.
-    pub strong: bool,
+    /// What its colour stands for; grey without one.
+    pub ink: Option<Ink>,
 }
 
 impl Bars<'_> {
@@ -95,7 +97,7 @@ fn end(axes: &Axes, row: u16, bar: &Bar) -> (f32, f32) {
 fn area(axes: &Axes, row: u16, bar: &Bar) -> Shape {
     let (right, middle) = end(axes, row, bar);
     let half = 0.5 * BAR_SHARE * ROW_PX;
-    let colour = if bar.strong { PALETTE[0] } else { QUIET };
+    let colour = bar.ink.map_or(QUIET, Ink::colour);
     Shape::Area { corners: rectangle([axes.left, right], [middle - half, middle + half]), colour }
 }
 
@@ -130,7 +132,7 @@ fn guide_shapes(axes: &Axes, (value, name): (f64, &str)) -> Vec<Shape> {
     let middle =
         x.clamp(axes.left + half, (axes.left + axes.data_width - half).max(axes.left + half));
     vec![
-        Shape::Line { points: ends.to_vec(), colour: PALETTE[1], thickness_px: STROKE_PX },
+        Shape::Line { points: ends.to_vec(), colour: QUIET_INK, thickness_px: STROKE_PX },
         text(name, (middle, axes.top - GAP_PX), Anchor::Middle, TICK_LABEL_PX),
     ]
 }
@@ -140,8 +142,7 @@ mod tests {
     use super::*;
 
     fn bars(values: &[f64]) -> Bars<'static> {
-        let bar =
-            |&value: &f64| Bar { name: "drift", value, note: value.to_string(), strong: false };
+        let bar = |&value: &f64| Bar { name: "drift", value, note: value.to_string(), ink: None };
         let bars = values.iter().map(bar).collect();
         Bars { title: "Gain", subtitle: "", label: "gain, 1", bars, guide: Some((2.0, "floor")) }
     }

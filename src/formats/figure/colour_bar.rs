@@ -24,6 +24,11 @@ pub enum Scale {
 }
 
 impl Scale {
+    /// The colour at a share of the way from the least to the greatest value, 0 to 1; beyond them that of the nearer end.
+    pub fn colour_at(self, share: f64) -> Rgb {
+        self.colour((255.0 * share.clamp(0.0, 1.0)).round() as usize)
+    }
+
     /// The colour of a step from 0 to 255.
     fn colour(self, step: usize) -> Rgb {
         let colour = match self {

@@ -39,6 +39,8 @@ impl Plot<'_> {
     /// and its fonts write the text.
     ///
     /// The title is the element's accessible name. The subtitle and the legend are left to the page. The
+    /// For scripts, `data-x` holds the values at the ends of x and where those stand, `data-y` the same of y, and the
+    /// `data-name` of a path the name of its series. The
     /// style sheet finds the classes `plot`, `unclaimed`, `grid` and `zero`, the texts `tick` and `label`,
     /// and for a series `line`, `band`, `dots` or `mark`, with `many` where it has many points, together
     /// with [`Inline::classes`].
@@ -50,9 +52,13 @@ impl Plot<'_> {
         let axes = Axes::bare(self.axes()?, area, TICKS);
         let id = page.id;
         let mut svg = format!(
-            "<svg class=\"plot\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" \
-             aria-labelledby=\"{id}-title {id}-text\"><title id=\"{id}-title\">{}</title>\
+            "<svg class=\"plot\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" data-x=\"{} {} {LEFT} {RIGHT}\" \
+             data-y=\"{} {} {BOTTOM} {TOP}\" role=\"img\" aria-labelledby=\"{id}-title {id}-text\"><title id=\"{id}-title\">{}</title>\
              <desc id=\"{id}-text\">{}</desc>",
+            axes.x.low,
+            axes.x.high,
+            axes.y.low,
+            axes.y.high,
             escaped(self.title),
             escaped(page.description)
         );
@@ -61,10 +67,15 @@ impl Plot<'_> {
         let classes = page.classes.iter().map(String::as_str).chain(std::iter::repeat(""));
         for (series, class) in self.series.iter().zip(classes) {
             let many = if series.points.len() > MANY { " many" } else { "" };
-            let (name, path) = path(series.style, &series.trace(&axes));
-            if !path.is_empty() {
-                svg += &format!("<path class=\"{name}{many} {class}\" d=\"{path}\"/>");
+            let (shape, path) = path(series.style, &series.trace(&axes));
+            if path.is_empty() {
+                continue;
             }
+            svg += &format!("<path class=\"{shape}{many} {class}\"");
+            if !series.name.is_empty() {
+                svg += &format!(" data-name=\"{}\"", escaped(&series.name));
+            }
+            svg += &format!(" d=\"{path}\"/>");
         }
         Ok(svg + "</svg>")
     }
@@ -131,16 +142,20 @@ fn through(points: &[Point]) -> String {
     path
 }
 
-/// Marks on the nearest pixels, each once: thousands of points cost no more than the page is wide.
+/// Marks, each once. Many are put on the nearest pixels: they then cost no more than the page is wide.
 fn marks(places: &[Point], mark: &str) -> String {
-    let pixels: BTreeSet<(i32, i32)> =
-        places.iter().map(|(x, y)| (x.round() as i32, y.round() as i32)).collect();
-    pixels.into_iter().map(|(x, y)| format!("M{x} {y}{mark}")).collect()
+    let parts = if places.len() > MANY { 1.0 } else { 10.0 };
+    let places: BTreeSet<(i32, i32)> = places
+        .iter()
+        .map(|(x, y)| ((x * parts).round() as i32, (y * parts).round() as i32))
+        .collect();
+    let on_page = |(x, y): (i32, i32)| [x, y].map(|part| f64::from(part) / f64::from(parts));
+    places.into_iter().map(on_page).map(|[x, y]| format!("M{x} {y}{mark}")).collect()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::Series;
+    use super::super::{Ink, Series};
     use super::*;
 
     fn svg(style: Style, points: Vec<(f64, f64)>) -> Result<String, FigureError> {
@@ -149,7 +164,7 @@ mod tests {
             x_label: "incidence, °",
             y_label: "σ⁰, dB",
             x_range: Some((0.0, 90.0)),
-            series: vec![Series { name: String::new(), style, points }],
+            series: vec![Series { name: String::new(), style, ink: Ink::Own(0), points }],
             ..Plot::default()
         };
         let classes = ["ink0 is-measured".to_owned()];

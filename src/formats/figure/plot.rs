@@ -3,7 +3,8 @@
 use super::axes::{Axes, Axis};
 use super::drawing::{Anchor, Drawing, Point, Rgb, Shape, Weight, text_width_px};
 use super::error::FigureError;
-use super::style::{DIGIT_HEIGHT, GAP_PX, MARGIN_PX, PALETTE, STROKE_PX, TICK_LABEL_PX, text};
+use super::ink::Ink;
+use super::style::{DIGIT_HEIGHT, GAP_PX, LINE_SPACING, MARGIN_PX, STROKE_PX, TICK_LABEL_PX, text};
 
 /// Longest sides of the data area, px.
 const DATA_WIDTH_PX: f32 = 780.0;
@@ -36,9 +37,9 @@ pub struct Plot<'a> {
     pub x_label: &'a str,
     /// Quantity and unit along y.
     pub y_label: &'a str,
-    /// Values at the ends of x; those of the data if `None`.
+    /// Values at the ends of x; around the data if `None`, see [`Plot::x_span`].
     pub x_range: Option<(f64, f64)>,
-    /// Values at the ends of y; those of the data if `None`.
+    /// Values at the ends of y; around the data if `None`, see [`Plot::y_span`].
     pub y_range: Option<(f64, f64)>,
     /// One unit is as long along x as along y, as on a map.
     pub equal: bool,
@@ -53,6 +54,8 @@ pub struct Series {
     pub name: String,
     /// How the points are drawn.
     pub style: Style,
+    /// What its colour stands for; a guide is grey.
+    pub ink: Ink,
     /// (x, y); a point that is not finite interrupts a curve.
     pub points: Vec<(f64, f64)>,
 }
@@ -68,23 +71,26 @@ pub enum Style {
     Below,
     /// A small triangle that points up: the truth is above.
     Above,
-    /// The area that the points go round, in a tint of the colour of the other series of its name.
-    /// It is not in the legend, takes no colour and does not widen the axes.
+    /// The area that the points go round, in a tint of its colour. It is not in the legend and does not
+    /// widen the axes.
     Band,
-    /// Upright bars, each from one point to the next one, in the colour of the other series of its
-    /// name. They are not in the legend and take no colour.
+    /// Upright bars, each from one point to the next one. They are not in the legend.
     ErrorBars,
-    /// Dashes through the points in the colour of the other series of its name: a curve outside the range for
-    /// which it is claimed. It is not in the legend and takes no colour.
+    /// Dashes through the points: a curve outside the range for which it is claimed. It is not in the legend.
     Beyond,
-    /// A thin grey line to judge data by, such as zero. It takes no colour and does not widen the axes.
+    /// A thin grey line to judge data by, such as zero. It does not widen the axes.
     Guide,
 }
 
 impl Style {
-    /// Whether a series of this style has a colour of the palette for itself.
-    fn has_a_colour(self) -> bool {
-        !matches!(self, Style::Band | Style::ErrorBars | Style::Beyond | Style::Guide)
+    /// Whether the points are data, which the axes are made for.
+    fn is_data(self) -> bool {
+        matches!(self, Style::Points | Style::Below | Style::Above | Style::ErrorBars)
+    }
+
+    /// Whether a series of this style has a line of the legend.
+    fn is_named(self) -> bool {
+        !matches!(self, Style::Band | Style::ErrorBars | Style::Beyond)
     }
 }
 
@@ -112,12 +118,13 @@ impl Plot<'_> {
     pub fn drawing(&self) -> Result<Drawing, FigureError> {
         let [x, y] = self.axes()?;
         let data = self.size(x.high - x.low, y.high - y.low);
-        let axes = Axes::new([x, y], data, [self.title, self.subtitle], data[0]);
-        let mut shapes: Vec<Shape> = std::iter::zip(&self.series, self.colours())
-            .flat_map(|(series, colour)| series.shapes(&axes, colour))
-            .collect();
+        let mut axes = Axes::new([x, y], data, [self.title, self.subtitle], data[0]);
+        let (legend, legend_height) = self.legend(axes.left, axes.top, data[0]);
+        axes.top += legend_height;
+        let mut shapes: Vec<Shape> =
+            self.series.iter().flat_map(|series| series.shapes(&axes)).collect();
         shapes.extend(axes.shapes());
-        shapes.extend(self.legend(&axes));
+        shapes.extend(legend);
         Ok(Drawing {
             width_px: (axes.left + data[0] + MARGIN_PX).ceil(),
             height_px: (axes.top + axes.height_with_labels() + MARGIN_PX / 2.0).ceil(),
@@ -127,49 +134,47 @@ impl Plot<'_> {
 
     /// The two axes, x first.
     pub(super) fn axes(&self) -> Result<[Axis<'_>; 2], FigureError> {
-        let x = Axis { label: self.x_label, ..self.axis(self.x_range, |p| p.0)? };
-        let y = Axis { label: self.y_label, ..self.axis(self.y_range, |p| p.1)? };
+        let x = axis(self.x_label, self.x_range.or_else(|| self.x_span()))?;
+        let y = axis(self.y_label, self.y_range.or_else(|| self.y_span()))?;
         Ok([x, y])
     }
 
-    /// One colour per series; bands, error bars and dashes have that of the other series of their name.
-    fn colours(&self) -> Vec<Rgb> {
-        let own: Vec<&Series> = self.series.iter().filter(|s| s.style.has_a_colour()).collect();
-        let mut colours = Vec::with_capacity(self.series.len());
-        for series in &self.series {
-            let place = if series.style.has_a_colour() {
-                own.iter().position(|other| std::ptr::eq(*other, series))
-            } else {
-                own.iter().position(|other| other.name == series.name)
-            };
-            colours.push(match series.style {
-                Style::Guide => GUIDE_INK,
-                _ => PALETTE[place.unwrap_or(0) % PALETTE.len()],
-            });
-        }
-        colours
+    /// The range of x around the points; around the curves in a plot without points. None without finite values.
+    pub fn x_span(&self) -> Option<(f64, f64)> {
+        with_room(self.core(|p| p.0)?)
     }
 
-    /// The given range, or one that holds all finite values with a little room.
-    fn axis(
-        &self,
-        range: Option<(f64, f64)>,
-        of: fn(&(f64, f64)) -> f64,
-    ) -> Result<Axis<'static>, FigureError> {
-        let (low, high) = range.or_else(|| self.span(of)).unwrap_or((f64::NAN, f64::NAN));
-        if low < high && (high - low).is_finite() {
-            return Ok(Axis { label: "", low, high });
+    /// The range of y around the points, and around what the curves do between them, up to half as much again to either
+    /// side: the tail of a curve squeezes nothing. Around the curves in a plot without points. None without finite values.
+    pub fn y_span(&self) -> Option<(f64, f64)> {
+        let (low, high) = self.core(|p| p.1)?;
+        let x = self.x_range.or_else(|| self.x_span())?;
+        let curves = self.series.iter().filter(|s| matches!(s.style, Style::Curve | Style::Beyond));
+        let inside = curves.flat_map(|s| &s.points).filter(|p| p.0 >= x.0 && p.0 <= x.1);
+        let most = 0.5 * (high - low);
+        let mut span = (low, high);
+        for level in inside.map(|p| p.1).filter(|level| level.is_finite()) {
+            span = (span.0.min(level.max(low - most)), span.1.max(level.min(high + most)));
         }
-        Err(FigureError::Range { low, high })
+        with_room(span)
     }
 
-    /// A range around all finite values of the data; none where there are none.
-    fn span(&self, of: fn(&(f64, f64)) -> f64) -> Option<(f64, f64)> {
-        let data = self.series.iter().filter(|s| !matches!(s.style, Style::Band | Style::Guide));
-        let values = data.flat_map(|s| &s.points).map(of).filter(|value| value.is_finite());
-        let (low, high) = (values.clone().reduce(f64::min)?, values.reduce(f64::max)?);
-        let room = if low < high { 0.04 * (high - low) } else { low.abs().max(1.0) };
-        Some((low - room, high + room))
+    /// Least and greatest of the finite values of the points; of the curves where the points have no extent.
+    fn core(&self, of: fn(&(f64, f64)) -> f64) -> Option<(f64, f64)> {
+        let kinds: [fn(Style) -> bool; 3] = [
+            Style::is_data,
+            |style| style.is_data() || style == Style::Curve,
+            |style| !matches!(style, Style::Band | Style::Guide),
+        ];
+        let spans = kinds.map(|is_wanted| {
+            let wanted = self.series.iter().filter(|s| is_wanted(s.style));
+            let finite =
+                wanted.flat_map(|s| &s.points).filter(|p| p.0.is_finite() && p.1.is_finite());
+            let values = finite.map(of);
+            Some((values.clone().reduce(f64::min)?, values.reduce(f64::max)?))
+        });
+        let found = spans.iter().flatten();
+        found.clone().find(|(low, high)| low < high).or(found.last()).copied()
     }
 
     fn size(&self, width: f64, height: f64) -> [f32; 2] {
@@ -181,55 +186,48 @@ impl Plot<'_> {
         [width, height].map(|side| ((side * scale) as f32).max(EQUAL_SIDE_PX / 4.0).round())
     }
 
-    /// Names of the series in the corner that hides the least: the upper right one if it hides nothing.
-    fn legend(&self, axes: &Axes) -> Vec<Shape> {
-        let named: Vec<(&Series, Rgb)> = std::iter::zip(&self.series, self.colours())
-            .filter(|(series, _)| {
-                !series.name.is_empty()
-                    && (series.style.has_a_colour() || series.style == Style::Guide)
-            })
-            .collect();
-        let row_px = 1.4 * TICK_LABEL_PX;
-        let widest = named
-            .iter()
-            .map(|(series, _)| text_width_px(&series.name, TICK_LABEL_PX, Weight::Regular))
-            .fold(0.0, f32::max);
-        let size = (widest + SAMPLE_PX + 3.0 * GAP_PX, row_px * named.len() as f32 + 2.0 * GAP_PX);
-        let (left, top) = self.emptiest_corner(axes, size);
-        let left = left + GAP_PX;
-        let mut shapes = Vec::new();
-        for (row, (series, colour)) in named.into_iter().enumerate() {
-            let y = top + GAP_PX + (row as f32 + 0.6) * row_px;
+    /// Names of the series in rows from this corner, between the heading and the data, and their height, px.
+    fn legend(&self, left: f32, top: f32, width: f32) -> (Vec<Shape>, f32) {
+        let row_px = LINE_SPACING * TICK_LABEL_PX;
+        let (mut shapes, mut x, mut rows) = (Vec::new(), left, 0.0);
+        let named = self.series.iter().filter(|s| !s.name.is_empty() && s.style.is_named());
+        for series in named {
+            let name_px = text_width_px(&series.name, TICK_LABEL_PX, Weight::Regular);
+            let entry_px = SAMPLE_PX + GAP_PX + name_px;
+            if rows == 0.0 || x + entry_px > left + width {
+                (x, rows) = (left, rows + 1.0);
+            }
+            let y = top + (rows - 0.5) * row_px;
             let sample = match series.style {
                 Style::Points | Style::Below | Style::Above => {
-                    Trace::Marks(vec![(left + SAMPLE_PX / 2.0, y)])
+                    Trace::Marks(vec![(x + SAMPLE_PX / 2.0, y)])
                 }
-                _ => Trace::Lines(vec![vec![(left, y), (left + SAMPLE_PX, y)]]),
+                _ => Trace::Lines(vec![vec![(x, y), (x + SAMPLE_PX, y)]]),
             };
-            shapes.extend(series.style.paint(sample, colour, POINT_PX));
-            let base = (left + SAMPLE_PX + GAP_PX, y + DIGIT_HEIGHT / 2.0 * TICK_LABEL_PX);
+            shapes.extend(series.style.paint(sample, series.colour(), POINT_PX));
+            let base = (x + SAMPLE_PX + GAP_PX, y + DIGIT_HEIGHT / 2.0 * TICK_LABEL_PX);
             shapes.push(text(&series.name, base, Anchor::Start, TICK_LABEL_PX));
+            x += entry_px + 2.0 * GAP_PX;
         }
-        shapes
+        let below = if rows > 0.0 { GAP_PX } else { 0.0 };
+        (shapes, (rows * row_px + below).round())
     }
 }
 
-impl Plot<'_> {
-    /// Upper left point of a box of this size in the corner of the data area with the fewest points.
-    fn emptiest_corner(&self, axes: &Axes, (width, height): (f32, f32)) -> (f32, f32) {
-        let data = self.series.iter().filter(|series| series.style.has_a_colour());
-        let points: Vec<(f32, f32)> =
-            data.flat_map(|series| &series.points).map(|&(x, y)| axes.at(x, y)).collect();
-        let right = axes.left + axes.data_width - width;
-        let bottom = axes.top + axes.data_height - height;
-        let corners =
-            [(right, axes.top), (axes.left, axes.top), (right, bottom), (axes.left, bottom)];
-        let emptiest = corners.into_iter().min_by_key(|&(left, top)| {
-            let (columns, rows) = (left..=left + width, top..=top + height);
-            points.iter().filter(|(x, y)| columns.contains(x) && rows.contains(y)).count()
-        });
-        emptiest.unwrap_or(corners[0])
+/// An axis over a range.
+fn axis(label: &str, range: Option<(f64, f64)>) -> Result<Axis<'_>, FigureError> {
+    let (low, high) = range.unwrap_or((f64::NAN, f64::NAN));
+    if low < high && (high - low).is_finite() {
+        return Ok(Axis { label, low, high });
     }
+    Err(FigureError::Range { low, high })
+}
+
+/// A little room at both ends, but none below 0 for what is not negative.
+fn with_room((low, high): (f64, f64)) -> Option<(f64, f64)> {
+    let room = if low < high { 0.04 * (high - low) } else { low.abs().max(1.0) };
+    let floor = if low >= 0.0 { 0.0 } else { f64::NEG_INFINITY };
+    Some(((low - room).max(floor), high + room))
 }
 
 /// What of a series lies inside the axes, px.
@@ -278,9 +276,16 @@ impl Series {
         }
     }
 
-    fn shapes(&self, axes: &Axes, colour: Rgb) -> Vec<Shape> {
-        let side = if self.points.len() > DENSE { DENSE_POINT_PX } else { POINT_PX };
-        self.style.paint(self.trace(axes), colour, side)
+    fn colour(&self) -> Rgb {
+        if self.style == Style::Guide { GUIDE_INK } else { self.ink.colour() }
+    }
+
+    fn shapes(&self, axes: &Axes) -> Vec<Shape> {
+        if self.points.len() > DENSE {
+            // Paler, so that curves stand out of the cloud.
+            return self.style.paint(self.trace(axes), self.colour().map(pale), DENSE_POINT_PX);
+        }
+        self.style.paint(self.trace(axes), self.colour(), POINT_PX)
     }
 }
 
@@ -334,7 +339,12 @@ fn dashes(points: &[(f32, f32)]) -> Vec<Vec<(f32, f32)>> {
     pieces.into_iter().step_by(2).collect()
 }
 
-/// A colour's channel on the way to white.
+/// A colour's channel on half the way to white.
+fn pale(channel: u8) -> u8 {
+    255 - (255 - channel) / 2
+}
+
+/// A colour's channel on most of the way to white.
 fn tint(channel: u8) -> u8 {
     255 - (255 - channel) / 4
 }
@@ -355,7 +365,7 @@ mod tests {
 
     fn parabola(style: Style) -> Series {
         let points = (0..50).map(|i| (f64::from(i), -f64::from(i).powi(2))).collect();
-        Series { name: "parabola".into(), style, points }
+        Series { name: "parabola".into(), style, ink: Ink::Own(0), points }
     }
 
     #[test]
@@ -367,51 +377,84 @@ mod tests {
         assert!(both.svg().unwrap().contains("<svg"));
     }
 
+    fn words(plot: &Plot) -> Vec<(String, (f32, f32))> {
+        let shapes = plot.drawing().unwrap().shapes;
+        let texts = shapes.into_iter().filter_map(|shape| match shape {
+            Shape::Text(text) => Some((text.text, text.at)),
+            _ => None,
+        });
+        texts.collect()
+    }
+
     #[test]
-    fn a_band_has_the_colour_of_its_curve_and_leaves_the_axes_alone() {
+    fn a_band_leaves_the_axes_alone_and_has_no_name() {
         let far = vec![(0.0, -1e9), (49.0, -1e9), (49.0, 1e9), (0.0, 1e9)];
-        let band = Series { name: "parabola".into(), style: Style::Band, points: far };
+        let band = Series { points: far, ..parabola(Style::Band) };
         let alone = plot(vec![parabola(Style::Curve), parabola(Style::Below)]);
         let with = plot(vec![band, parabola(Style::Curve), parabola(Style::Below)]);
         let [without_band, with_band] = [&alone, &with].map(|plot| plot.drawing().unwrap());
         assert_eq!(with_band.shapes.len(), without_band.shapes.len() + 1);
         assert_eq!(with_band.shapes[1..], without_band.shapes[..]);
-        assert_eq!(with.colours(), [PALETTE[0], PALETTE[0], PALETTE[1]]);
     }
 
     #[test]
-    fn error_bars_have_the_colour_of_their_points_and_widen_the_axes() {
-        let bars: Vec<(f64, f64)> = (0..50).flat_map(|i| [(f64::from(i), 0.0); 2]).collect();
-        let bars = Series { name: "parabola".into(), style: Style::ErrorBars, points: bars };
-        let tall = Series { points: vec![(3.0, -1e4), (3.0, 1e4)], ..bars.clone() };
-        let zero = vec![(0.0, 0.0), (1e9, 0.0)];
-        let guide = Series { name: String::new(), style: Style::Guide, points: zero };
-        let other = Series { name: "other".into(), ..parabola(Style::Points) };
-        let all = plot(vec![guide, parabola(Style::Points), bars, other]);
-        assert_eq!(all.colours(), [GUIDE_INK, PALETTE[0], PALETTE[0], PALETTE[1]]);
-        let y = |plot: &Plot| plot.axis(None, |p| p.1).unwrap().high;
+    fn error_bars_widen_the_axes_and_a_guide_does_not() {
+        let tall = Series { points: vec![(3.0, -1e4), (3.0, 1e4)], ..parabola(Style::ErrorBars) };
+        let guide = Series { points: vec![(0.0, 0.0), (1e9, 0.0)], ..parabola(Style::Guide) };
+        let all = plot(vec![guide, parabola(Style::Points)]);
         let with = plot(vec![parabola(Style::Points), tall]);
-        assert!(y(&all) < 1e3 && y(&with) > 1e4);
-        assert!(all.axis(None, |p| p.0).unwrap().high < 60.0, "a guide widens nothing");
-        let lines = |plot: &Plot| {
-            let shapes = plot.drawing().unwrap().shapes;
-            let is_bar =
-                |s: &&Shape| matches!(s, Shape::Line { colour, .. } if *colour == PALETTE[0]);
-            shapes.iter().filter(is_bar).count()
-        };
-        assert_eq!(lines(&all), 50);
+        assert!(all.y_span().unwrap().1 < 1e3 && with.y_span().unwrap().1 > 1e4);
+        assert!(all.x_span().unwrap().1 < 60.0);
+        assert_eq!(all.series[0].colour(), GUIDE_INK);
     }
 
     #[test]
-    fn dashes_have_the_colour_of_their_curve_no_name_and_as_much_gap_as_line() {
-        let beyond = Series { style: Style::Beyond, ..parabola(Style::Curve) };
-        let with = plot(vec![beyond, parabola(Style::Curve)]);
-        assert_eq!(with.colours(), [PALETTE[0], PALETTE[0]]);
-        let names = |plot: &Plot| {
-            let shapes = plot.drawing().unwrap().shapes;
-            shapes.iter().filter(|s| matches!(s, Shape::Text(t) if t.text == "parabola")).count()
-        };
-        assert_eq!(names(&with), 1);
+    fn axes_fit_the_points_and_not_the_tail_of_a_curve() {
+        let points = (10..=60).map(|deg| (f64::from(deg), -0.1 * f64::from(deg))).collect();
+        let tail =
+            (0..900).map(|step| 0.1 * f64::from(step)).map(|deg| (deg, 3.0 - 0.02 * deg * deg));
+        let points = Series { points, ..parabola(Style::Points) };
+        let curve = Series { points: tail.collect(), ..parabola(Style::Curve) };
+        let both = plot(vec![points, curve.clone()]);
+        assert_eq!(both.x_span(), Some((8.0, 62.0)));
+        // From −6 to −1, and half of that to both sides.
+        let (low, high) = both.y_span().unwrap();
+        assert!((-9.0..=-8.5).contains(&low) && (1.3..=2.0).contains(&high), "{low} to {high}");
+        assert!(
+            plot(vec![curve]).y_span().unwrap().0 < -150.0,
+            "without points there is the curve"
+        );
+        let few =
+            plot(vec![Series { points: vec![(0.0, 1.0), (70.0, 2.0)], ..parabola(Style::Points) }]);
+        assert_eq!(few.x_span().unwrap().0, 0.0, "no angle is below 0");
+    }
+
+    #[test]
+    fn each_axis_has_four_ticks_wherever_it_ends() {
+        for high in (10..500).map(|step| f64::from(step) / 50.0) {
+            let ranges =
+                Plot { x_range: Some((0.0, high)), y_range: Some((-high, 0.3)), ..plot(vec![]) };
+            let names = words(&ranges);
+            let places = |of: fn(&(f32, f32)) -> f32| {
+                let numbers =
+                    names.iter().filter(|(text, _)| text.replace('−', "-").parse::<f64>().is_ok());
+                let mut places: Vec<f32> = numbers.map(|(_, at)| of(at)).collect();
+                places.sort_by(f32::total_cmp);
+                places
+            };
+            // Numbers below the axis share their height, and those beside it their place.
+            for mut places in [places(|at| at.0), places(|at| at.1)] {
+                let all = places.len();
+                places.dedup();
+                assert!(places.len() > 4 && all - places.len() >= 3, "to {high}: {names:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn dashes_have_no_name_and_as_much_gap_as_line() {
+        let with = plot(vec![parabola(Style::Beyond), parabola(Style::Curve)]);
+        assert_eq!(words(&with).iter().filter(|(text, _)| text == "parabola").count(), 1);
         let line: Vec<(f32, f32)> = (0..=700_u16).map(|x| (f32::from(x), 0.0)).collect();
         let dashes = dashes(&line);
         let drawn_px: f32 = dashes.iter().map(|d| d.last().unwrap().0 - d[0].0).sum();
@@ -419,22 +462,27 @@ mod tests {
     }
 
     #[test]
-    fn the_legend_goes_where_it_hides_nothing() {
-        let line = |slope: f64| {
-            let points = (0..100).map(|i| (f64::from(i), slope * f64::from(i))).collect();
-            plot(vec![Series { name: "line".into(), style: Style::Points, points }])
-        };
-        let name_at = |plot: &Plot| {
-            let shapes = plot.drawing().unwrap().shapes;
-            let name = shapes.iter().find_map(|shape| match shape {
-                Shape::Text(text) if text.text == "line" => Some(text.at),
+    fn the_legend_stands_above_the_data_in_rows_that_fit() {
+        let named = |name: &str| Series { name: name.to_owned(), ..parabola(Style::Points) };
+        for count in [1, 3, 12] {
+            let names: Vec<String> =
+                (0..count).map(|i| format!("a curve of some name, {i}")).collect();
+            let plot = plot(names.iter().map(|name| named(name)).collect());
+            let page = plot.drawing().unwrap();
+            let frame = page.shapes.iter().find_map(|shape| match shape {
+                Shape::Line { points, .. } if points.len() == 5 => Some(points[0]),
                 _ => None,
             });
-            name.unwrap()
-        };
-        let [rising, falling] = [1.0, -1.0].map(|slope| name_at(&line(slope)));
-        assert!(rising.0 < 400.0 && falling.0 > 400.0, "{rising:?} {falling:?}");
-        assert_eq!(rising.1, falling.1);
+            let (left, top) = frame.unwrap();
+            for (text, at) in words(&plot).iter().filter(|(text, _)| names.contains(text)) {
+                let right = at.0 + text_width_px(text, TICK_LABEL_PX, Weight::Regular);
+                assert!(
+                    at.1 < top && at.0 > left && right <= left + DATA_WIDTH_PX + 2.0,
+                    "{text}: {at:?}"
+                );
+            }
+            assert!(page.height_px > top + DATA_HEIGHT_PX);
+        }
     }
 
     #[test]

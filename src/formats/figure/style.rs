@@ -6,10 +6,6 @@ use super::ticks::Tick;
 pub(super) const INK: Rgb = [34, 34, 34];
 pub(super) const QUIET_INK: Rgb = [96, 96, 96];
 
-/// Colours that stay apart for colour-blind readers: Okabe and Ito, 2008.
-pub(super) const PALETTE: [Rgb; 6] =
-    [[0, 114, 178], [213, 94, 0], [0, 158, 115], [204, 121, 167], [230, 159, 0], [86, 180, 233]];
-
 pub(super) const TITLE_PX: f32 = 27.0;
 pub(super) const LABEL_PX: f32 = 20.0;
 pub(super) const TICK_LABEL_PX: f32 = 18.0;

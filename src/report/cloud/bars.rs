@@ -2,7 +2,7 @@
 
 use super::models::shown;
 use crate::diagnose::{Candidate, Report};
-use crate::formats::figure::{Bar, Bars, FigureError};
+use crate::formats::figure::{Bar, Bars, FigureError, Ink};
 use crate::formats::words::{fixed, plus_minus};
 use crate::report::picture::Picture;
 
@@ -16,7 +16,11 @@ pub(super) fn ranking(report: &Report) -> Result<Picture, FigureError> {
             name: candidate.name,
             value: if candidate.gain.is_finite() { candidate.gain } else { 0.0 },
             note: note(candidate, &report.ranking),
-            strong: report.effects.iter().any(|found| found.name == candidate.name),
+            ink: report
+                .effects
+                .iter()
+                .any(|found| found.name == candidate.name)
+                .then_some(Ink::After),
         });
     }
     let placebos = first.iter().filter_map(|c| c.placebo_gain).filter(|gain| gain.is_finite());
@@ -28,7 +32,7 @@ pub(super) fn ranking(report: &Report) -> Result<Picture, FigureError> {
         bars,
         guide,
     };
-    let added = if report.effects.is_empty() { "" } else { " Blue ones were added in the end." };
+    let added = if report.effects.is_empty() { "" } else { " Green ones were added in the end." };
     let placebo = match guide {
         Some(_) => {
             " The line is the gain of a random smooth field with as many parameters as the effect (six at most); the \
@@ -83,8 +87,8 @@ pub(super) fn error(report: &Report) -> Result<Picture, FigureError> {
         bars: shown(
             report,
             [
-                error_bar(before, error.before.rmse_db, false),
-                error_bar("after: with the effects", error.after.rmse_db, true),
+                error_bar(before, error.before.rmse_db, Ink::Before),
+                error_bar("after: with the effects", error.after.rmse_db, Ink::After),
             ],
         ),
         guide: Some((error.noise_floor_db, &floor)),
@@ -102,6 +106,6 @@ pub(super) fn error(report: &Report) -> Result<Picture, FigureError> {
     })
 }
 
-fn error_bar(name: &'static str, rmse_db: f64, strong: bool) -> Bar<'static> {
-    Bar { name, value: rmse_db, note: format!("{rmse_db:.2} dB"), strong }
+fn error_bar(name: &'static str, rmse_db: f64, ink: Ink) -> Bar<'static> {
+    Bar { name, value: rmse_db, note: format!("{rmse_db:.2} dB"), ink: Some(ink) }
 }

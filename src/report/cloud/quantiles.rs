@@ -14,9 +14,9 @@ const TAIL: usize = 40;
 pub(super) fn picture(report: &Report) -> Result<Picture, FigureError> {
     let z: [fn(&Row) -> f64; 2] = [|row| row.z_before, |row| row.z_after];
     let mut series = vec![guide("model is right", [-7.0, 7.0], |x| x)];
-    for (z, name) in shown(report, z).into_iter().zip(names(report)) {
+    for (z, (name, ink)) in shown(report, z).into_iter().zip(names(report)) {
         let points = points(report.rows.iter().map(z).collect());
-        series.push(Series { name: name.to_owned(), style: Style::Points, points });
+        series.push(Series { name: name.to_owned(), style: Style::Points, ink, points });
     }
     let plot = Plot {
         title: "Quantiles of z",

@@ -104,7 +104,7 @@ fn plot<'a>(report: &Report, trend: &'a Trend, reach_db: f64) -> Plot<'a> {
     let room = 0.04 * (to - from);
     let mut series = vec![guide("", [from - room, to + room], |_| 0.0)];
     let models = [&trend.before, &trend.after];
-    for (bins, name) in shown(report, models).into_iter().zip(names(report)) {
+    for (bins, (name, ink)) in shown(report, models).into_iter().zip(names(report)) {
         let (mut points, mut bars) = (Vec::new(), Vec::new());
         for bin in bins {
             points.push((bin.at, bin.mean_db));
@@ -112,8 +112,8 @@ fn plot<'a>(report: &Report, trend: &'a Trend, reach_db: f64) -> Plot<'a> {
             bars.push((bin.at, bin.mean_db + bin.se_db));
         }
         let name = name.to_owned();
-        series.push(Series { name: name.clone(), style: Style::ErrorBars, points: bars });
-        series.push(Series { name, style: Style::Points, points });
+        series.push(Series { name: name.clone(), style: Style::ErrorBars, ink, points: bars });
+        series.push(Series { name, style: Style::Points, ink, points });
     }
     Plot {
         title: trend.covariate.name,

@@ -1,7 +1,7 @@
 //! The curve with the models before and after, and their residuals.
 
 use crate::diagnose::curve::{CurveReport, CurveRow, Kind};
-use crate::formats::figure::{FigureError, Plot, Series, Style};
+use crate::formats::figure::{FigureError, Ink, Plot, Series, Style};
 use crate::formats::words::digits;
 use crate::report::picture::Picture;
 
@@ -51,12 +51,15 @@ fn angle_deg(report: &CurveReport, row: &CurveRow) -> f64 {
 /// A model's level in a row, dB.
 type LevelDb = fn(&CurveRow) -> f64;
 
-/// Names and levels of the models that a picture shows.
-fn models(report: &CurveReport) -> Vec<(&'static str, LevelDb)> {
+/// Names, inks and levels of the models that a picture shows.
+fn models(report: &CurveReport) -> Vec<(&'static str, Ink, LevelDb)> {
     if report.effects.is_empty() {
-        vec![("base law", |row| row.before_db)]
+        vec![("base law", Ink::Before, |row| row.before_db)]
     } else {
-        vec![("before", |row| row.before_db), ("after", |row| row.after_db)]
+        vec![
+            ("before", Ink::Before, |row| row.before_db),
+            ("after", Ink::After, |row| row.after_db),
+        ]
     }
 }
 
@@ -80,15 +83,16 @@ fn levels<'a>(report: &CurveReport, scan: &[CurveRow], title: &'a str) -> Plot<'
         let points = if row.censored { &mut below } else { &mut seen };
         points.push((angle_deg(report, row), row.observed_db));
     }
+    let ink = Ink::Detections;
     let mut series =
-        vec![Series { name: "measured".to_owned(), style: Style::Points, points: seen }];
+        vec![Series { name: "measured".to_owned(), style: Style::Points, ink, points: seen }];
     if !below.is_empty() {
         let name = "not detected".to_owned();
-        series.push(Series { name, style: Style::Below, points: below });
+        series.push(Series { name, style: Style::Below, ink, points: below });
     }
-    for (name, level) in models(report) {
+    for (name, ink, level) in models(report) {
         let points = scan.iter().map(|row| (angle_deg(report, row), level(row))).collect();
-        series.push(Series { name: name.to_owned(), style: Style::Curve, points });
+        series.push(Series { name: name.to_owned(), style: Style::Curve, ink, points });
     }
     let [x_label, y_label] = labels(report);
     Plot { title, x_label, y_label, series, ..Plot::default() }
@@ -99,15 +103,16 @@ fn residuals<'a>(report: &CurveReport, scan: &[CurveRow], reach_db: f64) -> Plot
     let guide = Series {
         name: String::new(),
         style: Style::Guide,
+        ink: Ink::Detections,
         points: ends.map(|x| (x, 0.0)).to_vec(),
     };
     let mut series = vec![guide];
-    for (name, level) in models(report) {
+    for (name, ink, level) in models(report) {
         let mut points = Vec::new();
         for row in scan.iter().filter(|row| !row.censored) {
             points.push((angle_deg(report, row), row.observed_db - level(row)));
         }
-        series.push(Series { name: name.to_owned(), style: Style::Curve, points });
+        series.push(Series { name: name.to_owned(), style: Style::Curve, ink, points });
     }
     let [x_label, _] = labels(report);
     Plot {

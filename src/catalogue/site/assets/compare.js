@@ -3,7 +3,8 @@
 (() => {
   const MOST = 6, OFFERED = 12;
   const SVG = 'http://www.w3.org/2000/svg';
-  const WIDTH = 720, HEIGHT = 420, LEFT = 84, RIGHT = 18, TOP = 44, BOTTOM = 64;
+  // Names of the curves stand right of the data.
+  const WIDTH = 720, HEIGHT = 420, LEFT = 84, RIGHT = 170, TOP = 44, BOTTOM = 64, GAP = 8;
   const SLUG = /^[a-z0-9][a-z0-9-]{0,63}$/;
 
   const byId = (id) => document.getElementById(id);
@@ -95,7 +96,11 @@
     byId('plot').replaceChildren();
     if (!there.length) return;
     const picture = plot(there);
-    if (picture) byId('plot').append(picture);
+    if (picture) {
+      byId('plot').append(picture);
+      name(picture, there);
+      window.matdbPlot(picture);
+    }
     byId('values').replaceChildren(table(there));
   };
 
@@ -121,53 +126,92 @@
       return make('li', {}, ...rendered.map((line) => sample(ink, material, line)), link, ...badges(material), ...others(ink, material), button);
     }));
   };
-  const step = (span, wanted) => {
-    const rough = span / wanted, power = 10 ** Math.floor(Math.log10(rough));
-    return power * ([1, 2, 5].find((factor) => factor * power >= rough * (1 - 1e-9)) ?? 10);
+  // Ticks at round values, at least four of them.
+  const ticks = (low, high, wanted) => {
+    for (let more = wanted; ; more += 1) {
+      const rough = (high - low) / more, power = 10 ** Math.floor(Math.log10(rough));
+      const every = power * ([1, 2, 5].find((factor) => factor * power >= rough * (1 - 1e-9)) ?? 10);
+      const first = Math.ceil(low / every - 1e-9), last = Math.floor(high / every + 1e-9);
+      const decimals = Math.max(0, -Math.floor(Math.log10(every) + 1e-9));
+      if (last - first >= 3 || more > 12) return Array.from({ length: last - first + 1 }, (_, i) => [(first + i) * every, ((first + i) * every).toFixed(decimals).replace('-', '−')]);
+    }
   };
   const plot = (there) => {
-    const levels = there.flatMap(({ material: m }) => [...m.lines.flatMap((line) => line.pieces.flat()), ...m.curves.flatMap((c) => [...c.seen, ...c.below, ...c.above])]).map(([, level]) => level);
-    if (!levels.length) return null;
-    let low = Infinity, high = -Infinity;
-    for (const level of levels) { low = Math.min(low, level); high = Math.max(high, level); }
+    const drawn = there.flatMap(({ material: m }) => [...m.lines.flatMap((line) => line.pieces.flat()), ...m.curves.flatMap((c) => [...c.seen, ...c.below, ...c.above])]);
+    if (!drawn.length) return null;
+    let low = Infinity, high = -Infinity, last = 0;
+    for (const [deg, level] of drawn) { low = Math.min(low, level); high = Math.max(high, level); last = Math.max(last, deg); }
+    last = Math.min(90, last + 2);
     const room = Math.max(1, 0.06 * (high - low));
     low -= room; high += room;
-    const x = (deg) => (LEFT + deg / 90 * (WIDTH - LEFT - RIGHT)).toFixed(1);
+    const x = (deg) => (LEFT + deg / last * (WIDTH - LEFT - RIGHT)).toFixed(1);
     const y = (level) => (HEIGHT - BOTTOM - (level - low) / (high - low) * (HEIGHT - TOP - BOTTOM)).toFixed(1);
     const names = there.map(({ material }) => material.name).join(', ');
-    const svg = draw('svg', { class: 'plot', viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: 'img', 'aria-labelledby': 'plot-title plot-text' },
+    const ends = { 'data-x': `0 ${last} ${LEFT} ${WIDTH - RIGHT}`, 'data-y': `${low} ${high} ${HEIGHT - BOTTOM} ${TOP}` };
+    const svg = draw('svg', { class: 'plot', viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: 'img', 'aria-labelledby': 'plot-title plot-text', ...ends },
       draw('title', { id: 'plot-title' }, `Backscatter of ${names}`),
       draw('desc', { id: 'plot-text' }, 'σ⁰ in dB over the angle of incidence. The table below holds the levels.'));
-    const every = step(high - low, 7);
-    for (let i = Math.ceil(low / every); i * every <= high; i += 1) {
-      svg.append(draw('path', { class: i ? 'grid' : 'grid zero', d: `M${LEFT} ${y(i * every)}H${WIDTH - RIGHT}` }),
-        draw('text', { class: 'tick', x: LEFT - 9, y: Number(y(i * every)) + 6, 'text-anchor': 'end' }, String(i * every).replace('-', '−')));
+    for (const [level, words] of ticks(low, high, 7)) {
+      svg.append(draw('path', { class: level ? 'grid' : 'grid zero', d: `M${LEFT} ${y(level)}H${WIDTH - RIGHT}` }),
+        draw('text', { class: 'tick', x: LEFT - 9, y: Number(y(level)) + 6, 'text-anchor': 'end' }, words));
     }
-    for (let deg = 0; deg <= 90; deg += 10) {
+    for (const [deg, words] of ticks(0, last, 9)) {
       svg.append(draw('path', { class: 'grid', d: `M${x(deg)} ${TOP}V${HEIGHT - BOTTOM}` }),
-        draw('text', { class: 'tick', x: x(deg), y: HEIGHT - BOTTOM + 26, 'text-anchor': 'middle' }, String(deg)));
+        draw('text', { class: 'tick', x: x(deg), y: HEIGHT - BOTTOM + 26, 'text-anchor': 'middle' }, words));
     }
     svg.append(draw('text', { class: 'label', x: (LEFT + WIDTH - RIGHT) / 2, y: HEIGHT - 10, 'text-anchor': 'middle' }, 'angle of incidence, °'),
       draw('text', { class: 'label', x: 9, y: 26 }, 'σ⁰, dB'));
     const each = (points, mark) => points.map(([deg, level]) => `M${x(deg)} ${y(level)}${mark}`).join('');
-    const put = (name, points, path) => { if (points.length) svg.append(draw('path', { class: `${name}${points.length > 150 ? ' many' : ''}`, d: path })); };
+    const put = (style, points, path, title) => { if (points.length) svg.append(draw('path', { class: `${style}${points.length > 150 ? ' many' : ''}`, 'data-name': title, d: path })); };
     for (const { ink, material } of there) {
-      for (const { kind, seen, below, above } of material.curves) {
+      for (const { name: curve, kind, seen, below, above } of material.curves) {
+        const title = `${material.name}, ${curve}`;
         const own = `ink${ink} is-${kind}`;
-        put(`dots ${own}`, seen, each(seen, 'h0'));
-        put(`mark ${own}`, below, each(below, 'm-4-3h8l-4 7z'));
-        put(`mark ${own}`, above, each(above, 'm-4 3h8l-4-7z'));
+        put(`dots ${own}`, seen, each(seen, 'h0'), title);
+        put(`mark ${own}`, below, each(below, 'm-4-3h8l-4 7z'), title);
+        put(`mark ${own}`, above, each(above, 'm-4 3h8l-4-7z'), title);
       }
     }
     for (const { ink, material } of there) {
       for (const line of material.lines) {
         for (const piece of line.pieces) {
           const path = piece.map(([deg, level], i) => `${i ? 'L' : 'M'}${x(deg)} ${y(level)}`).join('');
-          svg.append(draw('path', { class: styled(ink, material, line), d: path }));
+          const title = line.name === material.render ? material.name : `${material.name}, ${line.name}`;
+          svg.append(draw('path', { class: styled(ink, material, line), 'data-name': title, d: path }));
         }
       }
     }
     return svg;
+  };
+  // The name of each material at the end of what scenes render, or else of another line or its points; names keep apart.
+  const name = (svg, there) => {
+    const ends = [];
+    for (const { ink, material } of there) {
+      const paths = [...svg.querySelectorAll(`path.ink${ink}`)], lines = paths.filter((path) => path.classList.contains('line'));
+      const own = lines.filter((path) => !path.classList.contains('faint')).at(-1) ?? lines.at(-1) ?? paths.at(-1);
+      const [, x, y] = [...(own?.getAttribute('d') ?? '').matchAll(/[ML]([-\d.]+) ([-\d.]+)/g)].at(-1)?.map(Number) ?? [];
+      if (y !== undefined) ends.push({ ink, material, x, y, at: y });
+    }
+    ends.sort((a, b) => a.y - b.y);
+    const left = WIDTH - RIGHT + 3 * GAP;
+    for (const end of ends) {
+      end.text = draw('text', { class: `name ink${end.ink}`, x: left }, end.material.name);
+      svg.append(end.text);
+      for (let cut = end.material.name.length; end.text.getComputedTextLength() > WIDTH - left && cut > 1;) {
+        cut -= 1;
+        end.text.textContent = `${end.material.name.slice(0, cut).trimEnd()}…`;
+      }
+      end.text.append(draw('title', {}, end.material.name));
+    }
+    const row = ends.length ? 1.25 * parseFloat(getComputedStyle(ends[0].text).fontSize) : 0;
+    let least = TOP + row / 2;
+    for (const end of ends) { end.at = Math.max(end.at, least); least = end.at + row; }
+    let most = HEIGHT - BOTTOM;
+    for (const end of ends.toReversed()) { end.at = Math.min(end.at, most); most = end.at - row; }
+    for (const { ink, text, x, y, at } of ends) {
+      text.setAttribute('y', (at + row / 4).toFixed(1));
+      svg.append(draw('path', { class: `leader ink${ink}`, d: `M${x} ${y}L${WIDTH - RIGHT + GAP} ${at.toFixed(1)}H${left - 4}` }));
+    }
   };
   const table = (there) => {
     const head = make('tr', {}, make('th', { scope: 'col' }, 'incidence'),

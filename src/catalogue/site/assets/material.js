@@ -1,5 +1,5 @@
 'use strict';
-// Buttons that copy a citation.
+// Buttons that copy a text.
 (() => {
   const said = document.getElementById('copied');
   const select = (place) => {
