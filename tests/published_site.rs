@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::support::database::{complete, fitted, refitted, sample, with_effects};
-use crate::support::matdb;
+use crate::support::{matdb, read_cloud};
 use matdb::catalogue::{About, publish};
 use matdb::material::{Material, SourceKind, builtin};
 use matdb::store::Store;
@@ -401,6 +401,57 @@ fn a_fit_is_called_one_wherever_its_kind_stands() {
     for path in ["material/ptfe.html", "data/ptfe.js"] {
         assert!(!site.files[path].contains("fitted to "), "{path}");
     }
+}
+
+/// Power of a ring of the sphere on a material's page, dBm.
+fn on_the_sphere(page: &str, angle: &str) -> f64 {
+    let title = page.split(&format!("<title>{angle}°: ")).nth(1).expect(angle);
+    title.split(" dBm").next().unwrap().replace('−', "-").parse().unwrap()
+}
+
+#[test]
+fn the_sphere_of_a_page_has_the_powers_that_the_renderer_gives() {
+    /// A tenth for the rounding of the page, and as much for chirps beside the axis.
+    const POWER_DB: f64 = 0.2;
+    let site = site();
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["mannequin-paint", "ptfe", "cotton", "aluminium"] {
+        let page = &site.files[&format!("material/{name}.html")];
+        for (angle, tilt_deg) in [("0.9", 0.875), ("13", 13.0), ("31", 31.0)] {
+            let scene = format!(
+                "name = \"plate\"\n[radar]\nthreshold_dbm = -150\n[radar.scan]\npattern = \"raster\"\nlines = 3\n\
+                 chirps_per_line = 3\nwidth_m = 0.004\nheight_m = 0.004\n[[mesh]]\nname = \"plate\"\n\
+                 file = \"builtin:plate\"\nsize_m = [0.3, 0.3, 0]\nrotation_deg = [0, {tilt_deg}, 0]\n\
+                 translation_m = [0, 1.1, 0]\n[[region]]\nname = \"plate\"\nmaterial = \"{name}\"\n"
+            );
+            fs::write(folder.path().join("plate.toml"), scene).unwrap();
+            matdb(folder.path()).args(["render", "plate.toml", "-o", "out"]).assert().success();
+            let cloud = read_cloud(&folder.path().join("out/cloud.ply"));
+            let powers = &cloud["power_dbm"];
+            let rendered_dbm = powers.iter().sum::<f64>() / powers.len() as f64;
+            let drawn_dbm = on_the_sphere(page, angle);
+            assert!(
+                (drawn_dbm - rendered_dbm).abs() < POWER_DB,
+                "{name} at {angle}°: {drawn_dbm}, {rendered_dbm}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_page_says_how_to_go_on_with_commands_that_work() {
+    let site = site();
+    let page = &site.files["material/cotton.html"];
+    let shell = page.split("id=\"use-shell\">").nth(1).unwrap().split("</code>").next().unwrap();
+    let mut lines = 0;
+    for line in shell.lines() {
+        let words: Vec<&str> = line.split(' ').collect();
+        let ["matdb", "--db", "catalogue.sqlite", rest @ ..] = &words[..] else { panic!("{line}") };
+        matdb(&site.folder).args(["--db", "catalogue.sqlite"]).args(rest).assert().success();
+        lines += 1;
+    }
+    assert_eq!(lines, 2);
+    assert!(page.contains("md.open(&quot;catalogue.sqlite&quot;)[&quot;cotton@1&quot;]"));
 }
 
 #[test]

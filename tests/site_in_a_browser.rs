@@ -298,6 +298,95 @@ fn nothing_is_wider_than_a_small_phone() {
     }
 }
 
+/// Width and height of a screen.
+fn screen(browser: &Browser, width: u32, height: u32) {
+    let metrics =
+        json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600 });
+    browser.cdp("Emulation.setDeviceMetricsOverride", &metrics);
+}
+
+#[test]
+fn a_plot_says_its_values_to_the_pointer_and_to_the_arrow_keys() {
+    let site = site();
+    let Some(browser) = site.browser() else { return };
+    browser.open(&site.address("material/ptfe.html"));
+    let table = "return [...document.querySelectorAll('table')].find(t => t.caption.textContent.startsWith('Levels')).rows[1].cells[1].textContent";
+    let (facing, said) =
+        (browser.text(table), "return document.querySelector('.readout').textContent");
+    browser.tab_to("svg.plot");
+    browser.press("\u{e014}");
+    let first = browser.text(said);
+    assert!(
+        first.starts_with("0.0°") && first.ends_with(&facing),
+        "{first}, and {facing} in the table"
+    );
+    browser.press("\u{e014}\u{e014}");
+    assert_ne!(browser.text(said), first);
+    browser.script(
+        "const svg = document.querySelector('svg.plot'), box = svg.getBoundingClientRect(); \
+         svg.dispatchEvent(new PointerEvent('pointermove', { clientX: box.left + box.width / 2, \
+         clientY: box.top + box.height / 2 }))",
+    );
+    let middle = browser.text(said);
+    assert!(middle.contains("stated −") && !middle.starts_with("0.0°"), "{middle}");
+    // A detection near the pointer is named with its place.
+    browser.open(&site.address("material/cotton.html"));
+    browser.script(
+        "const dots = document.querySelector('svg.plot .dots'); \
+         const [, x, y] = dots.getAttribute('d').match(/M([\\d.]+) ([\\d.]+)/).map(Number); \
+         const at = new DOMPoint(x, y).matrixTransform(dots.getScreenCTM()); \
+         dots.ownerSVGElement.dispatchEvent(new PointerEvent('pointermove', { clientX: at.x, clientY: at.y }))",
+    );
+    let near = browser.text(said);
+    assert!(near.contains("backscatter, point at 0.0°: −5.8"), "{near}");
+    was_quiet(&browser, &site.address(""));
+}
+
+#[test]
+fn the_first_screen_of_a_comparison_shows_the_plot_with_the_names_at_its_curves() {
+    let site = site();
+    let Some(browser) = site.browser() else { return };
+    screen(&browser, 1280, 800);
+    browser.open(&site.address("compare.html#m=ptfe,glass,cotton,aluminium"));
+    browser.wait("return document.querySelectorAll('#plot .name').length === 4");
+    let bottom = "return document.querySelector('#plot svg').getBoundingClientRect().bottom";
+    let bottom = browser.script(bottom).as_f64().unwrap();
+    assert!(bottom <= 800.0, "the plot ends at {bottom} px");
+    for (width, height) in [(1280, 800), (390, 844)] {
+        screen(&browser, width, height);
+        browser.reload();
+        browser.wait("return document.querySelectorAll('#plot .name').length === 4");
+        // Names neither touch each other nor any curve, and none is cut off by the edge.
+        let free = browser.script(
+            "const box = e => e.getBoundingClientRect(), svg = document.querySelector('#plot svg'); \
+             const names = [...svg.querySelectorAll('.name')].map(box).sort((a, b) => a.top - b.top); \
+             const right = Math.max(...[...svg.querySelectorAll('.line, .dots, .mark')].map(e => box(e).right)); \
+             return names.every((b, i) => b.left > right && b.right <= box(svg).right + 1 && b.width > 20 \
+             && (i === 0 || b.top >= names[i - 1].top + 0.6 * b.height))",
+        );
+        assert_eq!(free, json!(true), "{width} px");
+        let ticks = browser.script("return document.querySelectorAll('#plot .tick').length");
+        assert!(ticks.as_u64() >= Some(8), "{ticks}");
+    }
+}
+
+#[test]
+fn a_phone_shows_that_a_table_goes_on() {
+    let site = site();
+    let Some(browser) = site.browser() else { return };
+    screen(&browser, 390, 844);
+    browser.open(&site.address("material/measured-plate.html"));
+    let wide = "return [...document.querySelectorAll('.scroll')].filter(e => e.scrollWidth > e.clientWidth + 8).length";
+    assert!(browser.script(wide).as_u64() > Some(0), "no table is wider than the phone");
+    // Two covers that move with the table over two shadows that stay.
+    let attached =
+        "return getComputedStyle(document.querySelector('.scroll')).backgroundAttachment";
+    assert_eq!(browser.text(attached), "local, local, scroll, scroll");
+    let hidden = "return [...document.querySelectorAll('.scroll td, .scroll th, .scroll table')].filter(e => \
+                  !/rgba\\(0, 0, 0, 0\\)/.test(getComputedStyle(e).backgroundColor)).length";
+    assert_eq!(browser.script(hidden), json!(0), "no cell hides the shadows");
+}
+
 #[test]
 fn every_page_of_the_example_catalogue_works_and_is_quiet() {
     let site = example();

@@ -111,6 +111,24 @@ fn a_rendering_is_shown_in_three_dimensions() {
     was_quiet(&browser);
 }
 
+/// The whole residual map before and after, on a screen of 1280 × 800.
+fn the_first_screen_shows_the_map(browser: &Browser, report: &Path) {
+    let screen = json!({ "width": 1280, "height": 800, "deviceScaleFactor": 1, "mobile": false });
+    browser.cdp("Emulation.setDeviceMetricsOverride", &screen);
+    browser.open(&format!("file://{}", report.display()));
+    let maps = browser.script(
+        "return [...document.querySelector('figure').querySelectorAll('svg')].map(e => { \
+         const b = e.getBoundingClientRect(); return [b.top, b.bottom, b.left, b.right]; })",
+    );
+    let maps = maps.as_array().unwrap();
+    assert_eq!(maps.len(), 2, "{maps:?}");
+    for place in maps.iter().flat_map(|one| one.as_array().unwrap()) {
+        assert!((0.0..=1280.0).contains(&place.as_f64().unwrap()), "{maps:?}");
+    }
+    assert!(maps.iter().all(|one| one[1].as_f64() <= Some(800.0)), "{maps:?}");
+    browser.cdp("Emulation.clearDeviceMetricsOverride", &json!({}));
+}
+
 #[test]
 fn a_diagnosis_shows_residuals_and_where_its_effects_act() {
     let folder = tempfile::tempdir().unwrap();
@@ -129,6 +147,7 @@ fn a_diagnosis_shows_residuals_and_where_its_effects_act() {
     diagnose.arg(scene("bench.toml")).arg("-o").arg(&why).assert().success();
     let page = std::fs::read_to_string(why.join("report.html")).unwrap();
     assert!(page.contains("href=\"view.html\""));
+    the_first_screen_shows_the_map(&browser, &why.join("report.html"));
 
     open(&browser, &why.join("view.html"));
     let detected = std::fs::read_to_string(why.join("residuals.csv")).unwrap();

@@ -149,7 +149,7 @@ mod tests {
     fn bands_hold_their_share_and_points_below_a_limit_count_as_below_it() {
         let mut ratios = Vec::new();
         for step in 0..1000 {
-            ratios.push(ratio(0.02 * f64::from(step), f64::from(step % 101) * 0.1 - 5.0));
+            ratios.push(ratio(0.02 * f64::from(step), f64::from(37 * step % 101) * 0.1 - 5.0));
         }
         let drawn = bands(&ratios);
         let styles: Vec<Style> = drawn.iter().map(|one| one.style).collect();

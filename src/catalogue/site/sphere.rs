@@ -40,7 +40,8 @@ pub(super) fn svg(material: &Material) -> Option<String> {
     let mut svg = format!(
         "<svg class=\"ball\" viewBox=\"0 0 312 212\" role=\"img\" aria-labelledby=\"ball-title ball-text\">\
          <title id=\"ball-title\">A sphere of this material</title>\
-         <desc id=\"ball-text\">Received power over a sphere, {}.</desc>",
+         <desc id=\"ball-text\">Received power over a sphere, {}.</desc>\
+         <g transform=\"translate({CENTRE} {CENTRE})\">",
         ball.in_words()
     );
     let rings = ball.rings();
@@ -56,11 +57,9 @@ pub(super) fn svg(material: &Material) -> Option<String> {
     }
     for theta_rad in crossings {
         let radius = RADIUS * theta_rad.sin();
-        let _ = write!(
-            svg,
-            "<circle class=\"threshold\" cx=\"{CENTRE}\" cy=\"{CENTRE}\" r=\"{radius:.1}\"/>"
-        );
+        let _ = write!(svg, "<circle class=\"threshold\" r=\"{radius:.1}\"/>");
     }
+    svg += "</g>";
     svg += &bar(radar.threshold_dbm);
     Some(svg + "</svg>")
 }
@@ -159,7 +158,7 @@ const EDGES_DEG: [[f64; 2]; 3] = [[0.0, 3.0], [3.0, 12.0], [12.0, 90.0]];
 impl Ring {
     fn svg(&self) -> String {
         let radius = RADIUS * self.to_rad.sin();
-        let circle = format!("<circle cx=\"{CENTRE}\" cy=\"{CENTRE}\" r=\"{radius:.1}\"");
+        let circle = format!("<circle r=\"{radius:.1}\"");
         let middle_deg = (0.5 * (self.from_rad + self.to_rad)).to_degrees();
         let angle = fixed(middle_deg, if middle_deg < 12.0 { 1 } else { 0 });
         match self.back {

@@ -16,7 +16,7 @@ pub mod ticks;
 pub use bars::{Bar, Bars};
 pub use colour_bar::{Scale, colours_of};
 pub use error::FigureError;
-pub use ink::Ink;
+pub use ink::{Ink, LESS_AND_MORE_HUE_DEG};
 pub use inline::Inline;
 pub use plot::{Plot, Series, Style};
 pub use raster::{Figure, beside};

@@ -62,7 +62,7 @@ pub(super) fn picture(report: &Report) -> Result<Picture, FigureError> {
     for bin in trends.iter().flat_map(|trend| trend.before.iter().chain(&trend.after)) {
         reach_db = reach_db.max(bin.mean_db.abs() + bin.se_db);
     }
-    reach_db *= 1.25;
+    reach_db *= 1.08;
     let mut panels = Vec::new();
     for trend in &trends {
         panels.push(plot(report, trend, reach_db).drawing()?);

@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::labels::label;
 use crate::error::Error;
 use crate::formats::base64::base64;
+use crate::formats::figure::LESS_AND_MORE_HUE_DEG;
 use crate::formats::words::{counted, grouped};
 use crate::geometry::Mesh;
 use crate::report::templates;
@@ -200,6 +201,8 @@ impl ViewPage<'_> {
             title: &'a str,
             about: String,
             notes: &'a [String],
+            /// Of less and of more than predicted.
+            hues: [f64; 2],
         }
         #[derive(Serialize)]
         struct Context<'a> {
@@ -209,7 +212,8 @@ impl ViewPage<'_> {
         let points = counted(self.points.count, "point");
         let version = env!("CARGO_PKG_VERSION");
         let about = format!("{} of {points}, made by matdb {version}", self.kind);
-        let page = Words { title: self.title, about, notes: &self.notes };
+        let hues = LESS_AND_MORE_HUE_DEG;
+        let page = Words { title: self.title, about, notes: &self.notes, hues };
         templates::page("view.html", &Context { page, data: serde_json::to_string(self)? })
     }
 }
