@@ -1,5 +1,6 @@
 """The bindings: the bytes of the command line, arrays that fit them, errors, interruption, threads and memory."""
 
+import html
 import json
 import pickle
 import re
@@ -515,3 +516,9 @@ def test_a_database_says_and_does_what_the_command_line_does(scene, tmp_path):
     with pytest.raises(md.StoreError, match="none.sqlite"):
         md.open("none.sqlite").publish("nowhere")
     assert not Path("nowhere").exists()
+    # What a page of the catalogue tells a reader to type.
+    page = Path("site/material/cotton.html").read_text(encoding="utf-8")
+    snippet = html.unescape(re.search(r'id="use-python">(.*?)</code>', page, re.DOTALL)[1])
+    done = subprocess.run([sys.executable, "-c", snippet], cwd="site", capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "cotton@1" in done.stdout and "[" in done.stdout
