@@ -157,14 +157,14 @@ pub fn appendix_figures() -> Result<Vec<(String, Vec<u8>)>, Error> {
 
 /// Bands of fits below points below curves of fits, so that each can be seen.
 pub fn fit_layers(fits: &[Fit], points: Vec<Series>) -> Vec<Series> {
-    let numbered = || fits.iter().enumerate();
-    let curves = numbered().map(|(number, fit)| {
+    let curves = fits.iter().enumerate().map(|(number, fit)| {
         // As the beam of the points sees it.
         let beam_rad = fit.beam_rad().unwrap_or(0.0);
         let seen = ThroughBeam { law: &fit.model, beam_rad };
         model_curve(&fit.name, &seen, Ink::Own(number))
     });
-    let bands = numbered().filter_map(|(number, fit)| band(fit, Ink::Own(number)));
+    let bands = fits.iter().enumerate();
+    let bands = bands.filter_map(|(number, fit)| band(fit, Ink::Own(number)));
     bands.chain(points).chain(curves).collect()
 }
 

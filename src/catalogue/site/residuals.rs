@@ -96,14 +96,12 @@ fn series(name: &str, style: Style, points: Vec<(f64, f64)>) -> Series {
 fn bands(ratios: &[Observation]) -> Vec<Series> {
     let mut sorted = ratios.to_vec();
     sorted.sort_by(|a, b| a.theta_i_rad.total_cmp(&b.theta_i_rad));
-    let steps =
-        |step_deg: f64| sorted.chunk_by(move |a, b| step_of(a, step_deg) == step_of(b, step_deg));
     let step_deg = STEPS_DEG
         .into_iter()
-        .find(|step_deg| sorted.len() >= 2 * FEWEST * steps(*step_deg).count())
+        .find(|step_deg| sorted.len() >= 2 * FEWEST * steps(&sorted, *step_deg).count())
         .unwrap_or(STEPS_DEG[2]);
-    let mut rows: Vec<(f64, [Option<f64>; 5])> = Vec::new();
-    for step in steps(step_deg).filter(|step| step.len() >= FEWEST) {
+    let mut rows: Vec<Row> = Vec::new();
+    for step in steps(&sorted, step_deg).filter(|step| step.len() >= FEWEST) {
         let middle_deg = (step_of(&step[0], step_deg) as f64 + 0.5) * step_deg;
         rows.push((middle_deg, quantiles(step, SHARES).map(|ratio| ratio.map(db_from_ratio))));
     }
@@ -121,14 +119,24 @@ fn bands(ratios: &[Observation]) -> Vec<Series> {
     drawn
 }
 
+/// Middle of a step, °, and its quantiles, dB.
+type Row = (f64, [Option<f64>; SHARES.len()]);
+
+/// Points by steps of the angle; they are sorted by it.
+fn steps(sorted: &[Observation], step_deg: f64) -> impl Iterator<Item = &[Observation]> {
+    sorted.chunk_by(move |a, b| step_of(a, step_deg) == step_of(b, step_deg))
+}
+
 /// Along the lower quantile and back along the upper one, as far as that is known.
-fn outline(run: &[(f64, [Option<f64>; 5])], low: usize, high: usize) -> Vec<(f64, f64)> {
-    let known = || run.iter().filter(|(_, levels)| levels[high].is_some());
-    let end = |(deg, levels): &(f64, [Option<f64>; 5]), place: usize| {
-        (*deg, levels[place].unwrap_or(FAR_BELOW_DB))
-    };
-    let lower = known().map(|row| end(row, low));
-    lower.chain(known().rev().map(|row| end(row, high))).collect()
+fn outline(run: &[Row], low: usize, high: usize) -> Vec<(f64, f64)> {
+    let (mut lower, mut upper) = (Vec::new(), Vec::new());
+    for (deg, levels) in run {
+        let Some(high_db) = levels[high] else { continue };
+        lower.push((*deg, levels[low].unwrap_or(FAR_BELOW_DB)));
+        upper.push((*deg, high_db));
+    }
+    lower.extend(upper.into_iter().rev());
+    lower
 }
 
 fn step_of(o: &Observation, step_deg: f64) -> u32 {

@@ -47,10 +47,8 @@ pub(super) fn svg(material: &Material) -> Option<String> {
     let rings = ball.rings();
     let mut crossings = Vec::new();
     for (number, ring) in rings.iter().enumerate() {
-        let is_seen =
-            |ring: &Ring| matches!(ring.back, Return::Power(dbm) if dbm >= radar.threshold_dbm);
         // Rings lie on each other, the widest lowest.
-        if number > 0 && is_seen(&rings[number - 1]) != is_seen(ring) {
+        if number > 0 && rings[number - 1].is_seen(&radar) != ring.is_seen(&radar) {
             crossings.push(ring.to_rad);
         }
         svg += &ring.svg();
@@ -156,6 +154,11 @@ impl Ball<'_> {
 const EDGES_DEG: [[f64; 2]; 3] = [[0.0, 3.0], [3.0, 12.0], [12.0, 90.0]];
 
 impl Ring {
+    /// Whether its echo passes the threshold of a radar.
+    fn is_seen(&self, radar: &Radar) -> bool {
+        matches!(self.back, Return::Power(dbm) if dbm >= radar.threshold_dbm)
+    }
+
     fn svg(&self) -> String {
         let radius = RADIUS * self.to_rad.sin();
         let circle = format!("<circle r=\"{radius:.1}\"");
@@ -188,11 +191,16 @@ fn colour(dbm: f64) -> String {
     format!("#{red:02x}{green:02x}{blue:02x}")
 }
 
+/// Where a power stands on the bar, px from the top of the drawing.
+fn down(dbm: f64) -> f64 {
+    let ([_, _, top, height], [low, high]) = (BAR, COLOURS_DBM);
+    top + height * (high - dbm) / (high - low)
+}
+
 /// The colours with their powers, and the threshold of the radar.
 fn bar(threshold_dbm: f64) -> String {
-    let [left, width, top, height] = BAR;
+    let [left, width, ..] = BAR;
     let [low, high] = COLOURS_DBM;
-    let down = |dbm: f64| top + height * (high - dbm) / (high - low);
     let mut svg = String::new();
     let step_dbm = (high - low) / f64::from(BAR_STEPS);
     for step in 0..BAR_STEPS {

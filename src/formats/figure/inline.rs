@@ -149,8 +149,12 @@ fn marks(places: &[Point], mark: &str) -> String {
         .iter()
         .map(|(x, y)| ((x * parts).round() as i32, (y * parts).round() as i32))
         .collect();
-    let on_page = |(x, y): (i32, i32)| [x, y].map(|part| f64::from(part) / f64::from(parts));
-    places.into_iter().map(on_page).map(|[x, y]| format!("M{x} {y}{mark}")).collect()
+    let mut path = String::new();
+    for (x, y) in places {
+        let [x, y] = [x, y].map(|part| f64::from(part) / f64::from(parts));
+        let _ = write!(path, "M{x} {y}{mark}");
+    }
+    path
 }
 
 #[cfg(test)]
