@@ -78,7 +78,7 @@ fn over(o: &Observation, law: &ThroughBeam) -> Observation {
     Observation {
         sigma0: o.sigma0.map(|sigma0| sigma0 / level),
         threshold_sigma0: o.threshold_sigma0.map(|sigma0| sigma0 / level),
-        ..o.clone()
+        ..*o
     }
 }
 
