@@ -296,8 +296,10 @@ fn filters(store: &Store) {
         tell(&format!("nearest of all by {rank:?}"), time / 1e3, "ms", None);
     }
     for words in ["no77", "amber no1", "amber", "paint"] {
-        let found = store.search(words, u32::MAX).unwrap().len();
-        let time = median_us(21, |_| drop(black_box(store.search(words, 20).unwrap())));
+        let found = store.search(words, &Filter::default(), u32::MAX).unwrap().len();
+        let time = median_us(21, |_| {
+            drop(black_box(store.search(words, &Filter::default(), 20).unwrap()))
+        });
         tell(&format!("full text `{words}`, 20 of {found}"), time, "us", Some(1000.0));
     }
 }

@@ -157,7 +157,7 @@ fn a_word_that_is_everywhere_fills_a_page_and_hides_no_rare_one() {
     let mut store = Store::in_memory().unwrap();
     store.add(&many(1200)).unwrap();
     let found = |words: &str, most: u32| -> Vec<String> {
-        let hits = store.search(words, most).unwrap();
+        let hits = store.search(words, &Filter::default(), most).unwrap();
         hits.iter().map(|hit| hit.slug.to_string()).collect()
     };
     for words in ["sheet", "shee", "sh", "tag sheet"] {
@@ -171,6 +171,36 @@ fn a_word_that_is_everywhere_fills_a_page_and_hides_no_rare_one() {
     assert_eq!(found("sheet no777", 9), ["sheet-0777"]);
     assert_eq!(found("no777", 9), ["sheet-0777"]);
     assert!(found("sheet zirconia", 9).is_empty());
+}
+
+#[test]
+fn a_filtered_search_finds_what_both_the_words_and_the_filter_find() {
+    let mut store = Store::in_memory().unwrap();
+    store.add(&many(1200)).unwrap();
+    let tag = |tag: &str| Filter { tag: Some(tag.to_owned()), ..Filter::default() };
+    let filters = [
+        Filter { frequency_hz: Some(300e9), ..Filter::default() },
+        Filter { frequency_hz: Some(1e3), ..Filter::default() },
+        Filter { fitted: Some(true), ..Filter::default() },
+        Filter { fitted: Some(false), frequency_hz: Some(300e9), ..tag("rare-7") },
+        tag("rare-7"),
+        tag("nowhere"),
+    ];
+    // Words of every material and of a few.
+    for words in ["sheet", "sh", "tag sheet", "no77", "sheet 07"] {
+        let search = |filter: &Filter, most: u32| -> BTreeSet<String> {
+            let hits = store.search(words, filter, most).unwrap();
+            hits.iter().map(|hit| hit.slug.to_string()).collect()
+        };
+        let all = search(&Filter::default(), u32::MAX);
+        for filter in &filters {
+            let matching = store.find(filter).unwrap();
+            let matching: BTreeSet<_> = matching.iter().map(|one| one.slug.to_string()).collect();
+            let both: BTreeSet<String> = all.intersection(&matching).cloned().collect();
+            assert_eq!(search(filter, u32::MAX), both, "{words} {filter:?}");
+            assert_eq!(search(filter, 2).len(), both.len().min(2), "{words} {filter:?}");
+        }
+    }
 }
 
 #[test]
@@ -202,14 +232,14 @@ fn what_is_found_is_the_current_revision_and_goes_with_its_material() {
     assert_eq!(store.find(&of("ceramic")).unwrap()[0].revision, 2);
     assert_eq!(store.summary(&paint.slug).unwrap().unwrap().name, paint.name);
     for words in ["zirconia", "ZIRC", "glimmering kil", "mannequin"] {
-        let hits = store.search(words, 9).unwrap();
+        let hits = store.search(words, &Filter::default(), 9).unwrap();
         assert_eq!(hits.len(), 1, "{words}");
         assert_eq!((hits[0].revision, hits[0].name.as_str()), (2, "Glimmering zirconia"));
     }
-    assert!(store.search("zirconia absent", 9).unwrap().is_empty());
+    assert!(store.search("zirconia absent", &Filter::default(), 9).unwrap().is_empty());
     assert!(store.damage().unwrap().is_empty());
     store.remove([&paint.slug]).unwrap();
-    assert!(store.search("zirconia", 9).unwrap().is_empty());
+    assert!(store.search("zirconia", &Filter::default(), 9).unwrap().is_empty());
     assert!(store.list().unwrap().is_empty() && store.summary(&paint.slug).unwrap().is_none());
     assert!(store.damage().unwrap().is_empty());
 }

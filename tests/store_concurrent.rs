@@ -54,7 +54,11 @@ fn what_another_program_writes_is_no_damage_to_a_reader() {
             writer.remove([&glass.slug]).unwrap();
         }
         drop(writer);
-        assert_eq!(reader.search("paint", 9).unwrap().len(), 1, "round {round}");
+        assert_eq!(
+            reader.search("paint", &Filter::default(), 9).unwrap().len(),
+            1,
+            "round {round}"
+        );
         assert_eq!(reader.damage().unwrap(), Vec::<String>::new(), "round {round}");
         assert_eq!(reader.find(&Filter::default()).unwrap().len(), 1 + (round + 1) % 2);
         reader.add([&paint]).unwrap();

@@ -8,6 +8,7 @@ True
 
 import signal
 import sys
+from collections.abc import Mapping
 
 from ._errors import UnknownMaterialError
 from ._matdb import (
@@ -31,17 +32,20 @@ from ._matdb import (
     Scene,
     SceneError,
     StoreError,
+    Table,
     UsageError,
     View,
     __version__,
     calibrate,
     compare,
     diagnose,
+    effects,
     fit,
     load_scene,
     measure,
     open,
     render,
+    verify,
 )
 from ._matdb import _run
 
@@ -66,6 +70,7 @@ __all__ = [
     "Scene",
     "SceneError",
     "StoreError",
+    "Table",
     "UnknownMaterialError",
     "UsageError",
     "View",
@@ -73,12 +78,16 @@ __all__ = [
     "calibrate",
     "compare",
     "diagnose",
+    "effects",
     "fit",
     "load_scene",
     "measure",
     "open",
     "render",
+    "verify",
 ]
+
+Mapping.register(Table)
 
 
 def _main() -> int:

@@ -1,9 +1,9 @@
 """Types of the extension module. What each does is in its own documentation: `help(matdb.render)`."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any, TypeAlias, final
+from typing import Any, Literal, TypeAlias, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,6 +29,7 @@ __all__ = [
     "Scene",
     "SceneError",
     "StoreError",
+    "Table",
     "UsageError",
     "View",
     "__version__",
@@ -36,17 +37,21 @@ __all__ = [
     "calibrate",
     "compare",
     "diagnose",
+    "effects",
     "fit",
     "load_scene",
     "measure",
     "open",
     "render",
+    "verify",
 ]
 
 __version__: str
 
 _Record: TypeAlias = dict[str, Any]
 _Name: TypeAlias = str | PathLike[str]
+_Kind: TypeAlias = Literal["measured", "literature", "modelled", "synthetic"]
+_Status: TypeAlias = Literal["active", "superseded", "withdrawn"]
 
 class Error(Exception):
     file: Path | None
@@ -65,6 +70,9 @@ class CatalogueError(Error): ...
 
 @final
 class Material:
+    def __new__(cls, name: str, sigma0_db: Callable[[NDArray[np.float64]], ArrayLike]) -> Material: ...
+    @property
+    def sampling_error_db(self) -> float | None: ...
     @property
     def name(self) -> str: ...
     @property
@@ -80,7 +88,10 @@ class Material:
     @property
     def content_hash(self) -> str: ...
     def sigma0_db(self, theta_deg: ArrayLike) -> NDArray[np.float64]: ...
+    def plot(self, ax: Any = None) -> Any: ...
     def to_dict(self) -> _Record: ...
+    @staticmethod
+    def _of_text(text: str, sampling_error_db: float | None) -> Material: ...
 
 @final
 class Database:
@@ -102,23 +113,61 @@ class Database:
         licence: str | None = None,
         kind: str | None = None,
         material_class: str | None = None,
+        title: str | None = None,
         description: str | None = None,
+        tags: Sequence[str] = ...,
+        authors: Sequence[str] = ...,
+        year: int | None = None,
+        curve: str | None = None,
+        columns: Mapping[str, str] | None = None,
+        model: str | None = None,
         instrument: str | None = None,
         frequency_ghz: float | None = None,
         threshold_dbm: float | None = None,
+        keep_render: bool = False,
     ) -> list[str]: ...
-    def search(self, words: str, *, most: int = 20) -> list[_Record]: ...
+    def materials(
+        self,
+        *,
+        most: int | None = None,
+        frequency_ghz: float | None = None,
+        tag: str | None = None,
+        kind: _Kind | None = None,
+        material_class: str | None = None,
+        fitted: bool | None = None,
+        status: _Status | None = None,
+    ) -> list[_Record]: ...
+    def search(
+        self,
+        words: str,
+        *,
+        most: int = 20,
+        frequency_ghz: float | None = None,
+        tag: str | None = None,
+        kind: _Kind | None = None,
+        material_class: str | None = None,
+        fitted: bool | None = None,
+        status: _Status | None = None,
+    ) -> list[_Record]: ...
     def history(self, name: str) -> list[_Record]: ...
     def predict(self, name: str, angles_deg: Sequence[float]) -> _Record: ...
     def diff(self, before: str, after: str) -> _Record: ...
     def cite(self, name: str) -> _Record: ...
     def near(
         self,
-        material: str,
+        material: str | None = None,
         *,
+        curve: Measurement | _Name | None = None,
+        columns: Mapping[str, str] | None = None,
         measured_at_ghz: float | None = None,
         shape: bool = False,
         most: int = 10,
+        frequency_ghz: float | None = None,
+        tag: str | None = None,
+        kind: _Kind | None = None,
+        material_class: str | None = None,
+        fitted: bool | None = None,
+        status: _Status | None = None,
     ) -> _Record: ...
     def withdraw(self, name: str, reason: str, *, superseded_by: str | None = None) -> int: ...
     def remove(self, *names: str) -> list[_Record]: ...
@@ -128,9 +177,12 @@ class Database:
     def check(self, *, repair: bool = False) -> _Record: ...
 
 def open(path: _Name = ...) -> Database: ...
+def verify(bundle: _Name) -> _Record: ...
 
 @final
 class Fit:
+    @property
+    def name(self) -> str: ...
     @property
     def parameters(self) -> dict[str, float]: ...
     @property
@@ -150,19 +202,26 @@ class Fit:
     def sigma0_db(self, theta_deg: ArrayLike) -> NDArray[np.float64]: ...
     def plot(self, ax: Any = None) -> Any: ...
     def to_dict(self) -> _Record: ...
+    @staticmethod
+    def _of_text(text: str) -> Fit: ...
 
 def fit(
-    what: _Name,
+    what: Measurement | Material | _Name,
     *,
     db: Database | None = None,
     model: str | None = None,
     method: str = "censored",
     curve: str | None = None,
+    columns: Mapping[str, str] | None = None,
     fixed: Mapping[str, float] | None = None,
     looks: float | None = None,
     noise_dbm: float | None = None,
+    theta_sd_deg: float | None = None,
+    level_sd_db: float | None = None,
+    split_deg: float | None = None,
     starts: int | None = None,
     seed: int | None = None,
+    fit_name: str | None = None,
 ) -> Fit: ...
 
 @final
@@ -171,7 +230,7 @@ class Scene:
         cls,
         *,
         meshes: Mapping[str, Any],
-        materials: str | Mapping[str, str] | None = None,
+        materials: str | Material | Mapping[str, str | Material] | None = None,
         name: str | None = None,
         **tables: Any,
     ) -> Scene: ...
@@ -187,9 +246,10 @@ class Scene:
     def text(self) -> str: ...
     def to_dict(self) -> _Record: ...
     def replace(self, **changes: Any) -> Scene: ...
+    def with_materials(self, materials: Mapping[str, str | Material]) -> Scene: ...
     def save(self, path: _Name) -> None: ...
     @staticmethod
-    def _of_parts(text: str, path: _Name, given: dict[str, Any]) -> Scene: ...
+    def _of_parts(text: str, path: _Name, given: dict[str, Any], materials: str) -> Scene: ...
 
 def load_scene(path: _Name) -> Scene: ...
 
@@ -216,16 +276,43 @@ class Measurement:
         fixed: Mapping[str, float] | None = None,
         looks: float | None = None,
         noise_dbm: float | None = None,
+        theta_sd_deg: float | None = None,
+        level_sd_db: float | None = None,
+        split_deg: float | None = None,
         starts: int | None = None,
         seed: int | None = None,
+        fit_name: str | None = None,
     ) -> Fit: ...
     def plot(self, ax: Any = None) -> Any: ...
     def save(self, folder: _Name) -> None: ...
+    def to_arrow(self) -> Any: ...
+    def __arrow_c_stream__(self, requested_schema: object | None = None) -> object: ...
     def __len__(self) -> int: ...
+    @staticmethod
+    def _of_parts(facts: str, files: Sequence[tuple[str, bytes]]) -> Measurement: ...
 
 def measure(
-    cloud: Cloud | Scan | _Name, scene: Scene | _Name, *, region: str | None = None, pose: _Name | None = None
+    cloud: Cloud | Scan | _Name,
+    scene: Scene | _Name,
+    *,
+    region: str | None = None,
+    pose: Sequence[float] | _Name | None = None,
+    refine: bool = False,
+    keep_pose: bool = False,
+    metric: Literal["along-ray", "point-to-plane", "point-to-point"] = "along-ray",
+    edge_margin_m: float | None = None,
+    exact_mesh: bool = False,
 ) -> Measurement: ...
+
+@final
+class Table(Mapping[str, NDArray[Any]]):
+    def __getitem__(self, name: str, /) -> NDArray[Any]: ...
+    def __iter__(self) -> Iterator[str]: ...
+    def __len__(self) -> int: ...
+    def to_arrow(self) -> Any: ...
+    def __arrow_c_stream__(self, requested_schema: object | None = None) -> object: ...
+    @staticmethod
+    def _of_columns(columns: dict[str, NDArray[Any]]) -> Table: ...
 
 @final
 class View:
@@ -240,7 +327,7 @@ class View:
     @property
     def y_m(self) -> NDArray[np.float64]: ...
     @property
-    def cloud(self) -> Mapping[str, NDArray[Any]]: ...
+    def cloud(self) -> Table: ...
     @property
     def xyz_m(self) -> NDArray[np.float64]: ...
     @property
@@ -275,7 +362,7 @@ class Scan:
     @property
     def y_m(self) -> NDArray[np.float64]: ...
     @property
-    def cloud(self) -> Mapping[str, NDArray[Any]]: ...
+    def cloud(self) -> Table: ...
     @property
     def xyz_m(self) -> NDArray[np.float64]: ...
     @property
@@ -290,6 +377,8 @@ class Scan:
     def save(self, folder: _Name) -> None: ...
     def show(self, *, view: str = "radar") -> Page: ...
     def plot(self, ax: Any = None) -> Any: ...
+    def to_open3d(self) -> Any: ...
+    def to_rerun(self, entity: str = "matdb") -> None: ...
     def _repr_png_(self) -> bytes: ...
     @staticmethod
     def _of_parts(
@@ -340,6 +429,8 @@ class Cloud:
     def _of_columns(columns: Sequence[tuple[str, NDArray[np.float64]]]) -> Cloud: ...
     @property
     def notices(self) -> list[str]: ...
+    def to_arrow(self) -> Any: ...
+    def __arrow_c_stream__(self, requested_schema: object | None = None) -> object: ...
     def __len__(self) -> int: ...
 
 @final
@@ -358,7 +449,7 @@ def compare(
     scene: Scene | _Name,
     *,
     db: Database | None = None,
-    pose: _Name | None = None,
+    pose: Sequence[float] | _Name | None = None,
     fit: str | None = None,
 ) -> Comparison: ...
 def calibrate(
@@ -378,15 +469,36 @@ class Diagnosis:
     def to_dict(self) -> _Record: ...
     def report(self, path: _Name) -> None: ...
     def save(self, folder: _Name) -> None: ...
+    @staticmethod
+    def _of_parts(
+        record: str,
+        page: bytes,
+        files: Sequence[tuple[str, bytes]],
+        from_folder: _Name,
+        read: Sequence[_Name],
+    ) -> Diagnosis: ...
 
 def diagnose(
     cloud: Cloud | Scan | _Name,
     scene: Scene | _Name,
     *,
     db: Database | None = None,
+    receiver: str | None = None,
     effects: Sequence[str] = ...,
     seed: int = 0,
     controls: bool = True,
 ) -> Diagnosis: ...
-def render(scene: Scene | _Name, *, db: Database | None = None, seed: int | None = None) -> Scan: ...
+def effects(name: str | None = None) -> list[_Record]: ...
+def render(
+    scene: Scene | _Name,
+    *,
+    db: Database | None = None,
+    seed: int | None = None,
+    all_hits: bool = False,
+    view: bool = False,
+    beat: bool = False,
+    crop: bool = False,
+    uncompressed: bool = False,
+    tracer: Literal["pinhole", "bvh", "brute", "gpu"] | None = None,
+) -> Scan: ...
 def _run(words: Sequence[_Name]) -> int: ...

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from ._matdb import Fit, Measurement, Scan
+    from ._matdb import Fit, Material, Measurement, Scan
 
 
 def _axes(ax: Any) -> Any:
@@ -37,6 +37,16 @@ def measurement(measured: Measurement, ax: Any = None) -> Any:
     if silent.any():
         ax.plot(measured.theta_deg[silent], measured.threshold_db[silent], "v", markersize=2, color="0.6",
                 label="not detected, below")
+    ax.set(xlabel="incidence, °", ylabel="σ⁰, dB")
+    ax.legend()
+    return ax
+
+
+def material(material: Material, ax: Any = None) -> Any:
+    """The backscatter of a material over the angle of incidence."""
+    ax = _axes(ax)
+    theta_deg = np.linspace(0, 89, 500)
+    ax.plot(theta_deg, material.sigma0_db(theta_deg), label=material.name)
     ax.set(xlabel="incidence, °", ylabel="σ⁰, dB")
     ax.legend()
     return ax

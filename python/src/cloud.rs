@@ -14,11 +14,13 @@ use matdb::units::dbm_from_watts;
 use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2, PyArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::{PyCapsule, PyDict, PyTuple};
 
+use crate::arrow::{Column, stream};
 use crate::error::{UsageError, no_choice, raised};
 use crate::scan::Scan;
 use crate::scene::Scene;
+use crate::words::in_python;
 
 /// Name of a cloud that is in no file.
 const POINTS: &str = "points";
@@ -238,7 +240,36 @@ impl Cloud {
     /// What a person should not overlook, a sentence each.
     #[getter]
     fn notices(&self) -> Vec<String> {
-        self.cloud.notices.clone()
+        self.cloud.notices.iter().map(|notice| in_python(notice)).collect()
+    }
+
+    /// A copy as a table of pyarrow: `x_m`, `y_m`, `z_m`, `power_dbm` (`power_db` where `is_relative`), `chirp` and `range_m`.
+    /// What a point lacks is null.
+    fn to_arrow<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("matdb._extras")?.call_method1("to_arrow", (slf,))
+    }
+
+    /// A copy by the Arrow C stream interface, as `to_arrow`.
+    #[pyo3(signature = (requested_schema = None))]
+    fn __arrow_c_stream__<'py>(
+        &self,
+        py: Python<'py>,
+        requested_schema: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyCapsule>> {
+        let _ = requested_schema;
+        let points = self.cloud.points();
+        let number =
+            |name, value: fn(&CloudPoint) -> f64| Column::of_f64(name, points.iter().map(value));
+        let power = if self.is_relative() { "power_db" } else { "power_dbm" };
+        let columns = vec![
+            number("x_m", |one| one.point.xyz.x),
+            number("y_m", |one| one.point.xyz.y),
+            number("z_m", |one| one.point.xyz.z),
+            number(power, |one| dbm_from_watts(one.power_w)),
+            Column::of_u32("chirp", points.iter().map(|one| one.chirp)),
+            number("range_m", |one| one.range_m.unwrap_or(f64::NAN)),
+        ];
+        stream(py, columns)
     }
 
     fn __len__(&self) -> usize {
@@ -275,7 +306,7 @@ impl Cloud {
 }
 
 /// Our names for columns, by theirs.
-fn column_names(names: &Bound<'_, PyDict>) -> PyResult<ColumnNames> {
+pub(crate) fn column_names(names: &Bound<'_, PyDict>) -> PyResult<ColumnNames> {
     if names.is_empty() {
         return Ok(ColumnNames::default());
     }

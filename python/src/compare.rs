@@ -6,9 +6,10 @@ use matdb::error::Error;
 use matdb::files::write_all;
 use matdb::frames::Pose;
 use matdb::measure::Calibration;
+use matdb::measure::Start;
 use matdb::measure::compare::Line;
 use matdb::report::{self, CalibrationReport};
-use matdb::setup::{ReadyScene, absolute, read_pose};
+use matdb::setup::{ReadyScene, absolute};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use serde_json::Value;
@@ -17,6 +18,7 @@ use crate::cloud::CloudLike;
 use crate::database::Database;
 use crate::error::{UsageError, raised};
 use crate::json::to_python;
+use crate::pose::PoseLike;
 use crate::scene::SceneLike;
 
 /// A measured image beside a simulated one.
@@ -35,8 +37,8 @@ pub(crate) struct Comparison {
 ///     With the materials to judge.
 /// db : Database, optional
 ///     Where materials are looked for; without it, and for those that it does not have, the built-in ones.
-/// pose : str or os.PathLike, optional
-///     The `pose.json` of a measurement: where the target stood.
+/// pose : sequence of float, str or os.PathLike, optional
+///     Where the target stood: the `pose.json` of a measurement, or x, y, z in m and turns about x, y, z in degrees.
 /// fit : str, optional
 ///     Name of a fit of the materials to render in place of what they render.
 ///
@@ -50,14 +52,22 @@ pub(crate) fn compare(
     cloud: CloudLike,
     scene: SceneLike,
     db: Option<&Database>,
-    pose: Option<PathBuf>,
+    pose: Option<PoseLike>,
     fit: Option<&str>,
 ) -> PyResult<Comparison> {
     let scene = scene.scene(py)?;
     let scene = scene.get();
     let compared = py.detach(|| {
         let store = db.map_or(Ok(None), Database::read)?;
-        let pose = pose.map_or(Ok(Pose::NONE), |file| read_pose(&file))?;
+        let pose = match pose.map(|pose| pose.start()).transpose()? {
+            None => Pose::NONE,
+            Some(Start::Given(pose)) => pose,
+            Some(Start::Automatic) => {
+                let problem = "pose = \"auto\" needs a registration".to_owned();
+                let way_out = "measure with it, and give the pose.json that it saves".to_owned();
+                return Err(Error::Usage { problem, way_out });
+            }
+        };
         let mut ready =
             ReadyScene::new_mean(scene.scene().clone(), scene.path(), pose, store.as_ref())?;
         drop(store);

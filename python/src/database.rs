@@ -3,29 +3,36 @@
 use std::path::PathBuf;
 
 use matdb::adopt::{
-    CatalogueImport, CheckReport, CurveOrigin, DatabaseCheck, FitStorage, FittedMaterial,
-    NewMaterials, Withdrawal, remove_materials,
+    CatalogueImport, CheckReport, CurveOrigin, DatabaseCheck, FitStorage, FitSubject,
+    FittedMaterial, NewMaterials, Withdrawal, remove_materials,
 };
 use matdb::catalogue::exchange::{Details, Export, Format};
-use matdb::catalogue::{About, Citable, Credit, Diff, Rank, publish, references};
+use matdb::catalogue::{self, About, Citable, Credit, Diff, Rank, publish, references};
 use matdb::error::Error;
 use matdb::files::{folder_of, read_small, write_all};
-use matdb::material::{Slug, builtin};
+use matdb::fit::model_names;
+use matdb::formats::ColumnNames;
+use matdb::material::{Slug, SourceKind, builtin};
+use matdb::measure::Curve;
 use matdb::report::{
-    ExportReport, ExportRequest, MaterialSearch, NeighbourSearch, Prediction, revision_records,
+    ExportReport, ExportRequest, MaterialList, MaterialSearch, NeighbourSearch, Prediction,
+    revision_records,
 };
 use matdb::setup::{self, MaterialRevision, find_material};
 use matdb::store::{Filter, Store};
 use matdb::units::watts_from_dbm;
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{PyDict, PyTuple};
 use serde_json::json;
 
+use crate::cloud::column_names;
 use crate::error::{UsageError, no_choice, raised, warn};
 use crate::fit::Fit;
 use crate::interrupt::interruptible;
 use crate::json::to_python;
 use crate::material::Material;
+use crate::measure::Measurement;
 
 /// A database of materials: a SQLite file. Built-in materials are found, too, where the file does not have them.
 ///
@@ -61,6 +68,7 @@ impl Database {
         name: &str,
         fit: &Fit,
         given: Details,
+        keep_render: bool,
     ) -> PyResult<Vec<String>> {
         let slug = name.parse::<Slug>();
         let slug = slug.map_err(|error| UsageError::new_err(error.to_string()))?;
@@ -77,9 +85,9 @@ impl Database {
             details.clone();
         let origin =
             CurveOrigin { kind, title: source, licence, instrument, frequency_hz, threshold_w };
-        let storage = FitStorage { material: Some(name.to_owned()), keep_render: false, origin };
-        let Fit { subject, result, fit_name, .. } = fit;
-        let fitted = FittedMaterial { subject, result, fit_name, details, storage };
+        let storage = FitStorage { material: Some(name.to_owned()), keep_render, origin };
+        let Fit { subject, fit, .. } = fit;
+        let fitted = FittedMaterial { subject, fit, details, storage };
         let stored = py.detach(|| fitted.store(&self.database())).map_err(raised)?;
         if stored.curve_is_open {
             let sentence =
@@ -88,6 +96,99 @@ impl Database {
         }
         Ok(vec![format!("{}@{}", stored.material, stored.revision)])
     }
+}
+
+/// How numbers came to be, by its word.
+fn source_kind(word: &str) -> PyResult<SourceKind> {
+    let known = "measured, literature, modelled or synthetic";
+    serde_json::from_value(json!(word)).map_err(|_| no_choice("kind", word, known))
+}
+
+/// A frequency, Hz, of one in GHz.
+fn frequency_hz(ghz: f64) -> PyResult<f64> {
+    /// Visible light: what lies above was not meant in GHz.
+    const HIGHEST_GHZ: f64 = 1e6;
+    if ghz > 0.0 && ghz <= HIGHEST_GHZ {
+        return Ok(ghz * 1e9);
+    }
+    Err(UsageError::new_err(format!("{ghz} GHz is not a frequency; give one above 0, such as 300")))
+}
+
+/// The conditions on materials that several functions take as keywords.
+fn filter_of(given: Option<&Bound<'_, PyDict>>) -> PyResult<Filter> {
+    let mut filter = Filter::default();
+    for (key, value) in given.into_iter().flatten() {
+        let key: String = key.extract()?;
+        match key.as_str() {
+            "frequency_ghz" => {
+                let ghz: Option<f64> = value.extract()?;
+                filter.frequency_hz = ghz.map(frequency_hz).transpose()?;
+            }
+            "tag" => filter.tag = value.extract()?,
+            "kind" => {
+                let word: Option<String> = value.extract()?;
+                filter.kind = word.as_deref().map(source_kind).transpose()?;
+            }
+            "material_class" => filter.class = value.extract()?,
+            "fitted" => filter.fitted = value.extract()?,
+            "status" => {
+                let word: Option<String> = value.extract()?;
+                let is_known = |word: &str| ["active", "superseded", "withdrawn"].contains(&word);
+                if let Some(word) = word.as_deref().filter(|word| !is_known(word)) {
+                    return Err(no_choice("status", word, "active, superseded or withdrawn"));
+                }
+                filter.status = word;
+            }
+            other => {
+                return Err(PyTypeError::new_err(format!(
+                    "unexpected keyword {other:?}; materials are chosen by frequency_ghz, tag, kind, material_class, fitted \
+                     and status"
+                )));
+            }
+        }
+    }
+    Ok(filter)
+}
+
+/// A curve whose neighbours are wanted.
+fn curve_of(
+    given: &Bound<'_, PyAny>,
+    columns: Option<&Bound<'_, PyDict>>,
+    frequency_hz: Option<f64>,
+) -> PyResult<NeighbourSearch> {
+    if let Ok(measured) = given.cast::<Measurement>() {
+        let (FitSubject { curve, .. }, instrument) = measured.get().subject();
+        let Curve { observations, illumination } = curve;
+        let frequency_hz = frequency_hz.or(Some(instrument.frequency_hz));
+        return Ok(NeighbourSearch { observations, illumination, frequency_hz, own: None });
+    }
+    let path: PathBuf = given
+        .extract()
+        .map_err(|_| PyTypeError::new_err("give a matdb.Measurement or the file of a curve"))?;
+    let columns = columns.map_or(Ok(ColumnNames::default()), column_names)?;
+    let bytes = read_small(&path).map_err(raised)?;
+    let (curve, notices) = Curve::read_as(&bytes, &columns)
+        .map_err(|error| raised(Error::CurveFile { file: path, error }))?;
+    warn(given.py(), &notices)?;
+    let Curve { observations, illumination } = curve;
+    Ok(NeighbourSearch { observations, illumination, frequency_hz, own: None })
+}
+
+/// Checks a published catalogue, and fits again what it holds, as `matdb verify --json` prints it. What is wrong is in
+/// `problems`.
+///
+/// Parameters
+/// ----------
+/// bundle : str or os.PathLike
+///     A published folder, or a database.
+///
+/// Returns
+/// -------
+/// dict
+#[pyfunction]
+pub(crate) fn verify<'py>(py: Python<'py>, bundle: PathBuf) -> PyResult<Bound<'py, PyAny>> {
+    let verified = py.detach(|| catalogue::verify(&bundle));
+    to_python(py, &verified.map_err(raised)?)
 }
 
 /// Opens a database. The first material that is added makes the file.
@@ -163,8 +264,22 @@ impl Database {
     /// kind : str, optional
     ///     How the curve came to be: `measured`, `literature`, `modelled` or `synthetic`. That of `measure` is `measured`
     ///     unless stated, and `synthetic` of a `Scan`.
-    /// material_class, description : str, optional
-    ///     Of a new material; the class of one of a fit is `sample` unless stated.
+    /// material_class, title, description : str, optional
+    ///     Of a new material; the class of one of a fit is `sample` unless stated, and the title its name.
+    /// tags : list of str, optional
+    ///     Words to find a new material by.
+    /// authors : list of str, optional
+    ///     Who measured or wrote the source, as in `Doe, Jane`.
+    /// year : int, optional
+    ///     Year of the source.
+    /// curve : str, optional
+    ///     Name of the curve of a file of others; that of the file unless stated.
+    /// columns : dict of str to str, optional
+    ///     Our names for columns of a CSV file, as in `{"inc": "theta_deg"}`; `-` passes one over.
+    /// model : str, optional
+    ///     Model that is fitted to the curve of a file of others and rendered in its place.
+    /// keep_render : bool, default False
+    ///     Whether scenes go on rendering what they did, where a fit is added.
     /// instrument : str, optional
     /// frequency_ghz, threshold_dbm : float, optional
     ///     What the curve was measured with; that of the scene that it was measured in unless stated.
@@ -184,8 +299,9 @@ impl Database {
     /// UserWarning
     ///     What is not known of a material, and what may be a slip.
     #[pyo3(signature = (*names, files = Vec::new(), name = None, source = None, licence = None, kind = None,
-                        material_class = None, description = None, instrument = None, frequency_ghz = None,
-                        threshold_dbm = None))]
+                        material_class = None, title = None, description = None, tags = Vec::new(), authors = Vec::new(),
+                        year = None, curve = None, columns = None, model = None, instrument = None, frequency_ghz = None,
+                        threshold_dbm = None, keep_render = false))]
     #[expect(clippy::too_many_arguments, reason = "each is a keyword in Python")]
     fn add(
         &self,
@@ -197,25 +313,42 @@ impl Database {
         licence: Option<String>,
         kind: Option<&str>,
         material_class: Option<String>,
+        title: Option<String>,
         description: Option<String>,
+        tags: Vec<String>,
+        authors: Vec<String>,
+        year: Option<u16>,
+        curve: Option<String>,
+        columns: Option<&Bound<'_, PyDict>>,
+        model: Option<String>,
         instrument: Option<String>,
         frequency_ghz: Option<f64>,
         threshold_dbm: Option<f64>,
+        keep_render: bool,
     ) -> PyResult<Vec<String>> {
-        let wrong = |error| UsageError::new_err(format!("kind: {error}"));
-        let kind = kind.map(|kind| serde_json::from_value(json!(kind))).transpose();
+        let kind = kind.map(source_kind).transpose()?;
+        let model = model.map(|name| match matdb::fit::model(&name) {
+            Some(start) => Ok((name, start)),
+            None => Err(no_choice("model", &name, &model_names().collect::<Vec<_>>().join(", "))),
+        });
         let slug = name.as_deref().map(str::parse::<Slug>).transpose();
         let given = Details {
             slug: slug.map_err(|error| UsageError::new_err(error.to_string()))?,
+            name: title,
             class: material_class,
             description,
-            kind: kind.map_err(wrong)?,
+            tags,
+            authors,
+            year,
+            curve,
+            columns: columns.map_or(Ok(ColumnNames::default()), column_names)?,
+            model: model.transpose()?,
+            kind,
             source,
             licence,
             instrument,
             frequency_hz: frequency_ghz.map(|ghz| ghz * 1e9),
             threshold_w: threshold_dbm.map(watts_from_dbm),
-            ..Details::default()
         };
         if let Ok((name, fit)) = names.extract::<(String, Bound<'_, Fit>)>() {
             if !files.is_empty() || given.slug.is_some() {
@@ -223,7 +356,7 @@ impl Database {
                     "a fit is added alone, under the name before it; leave files and name out";
                 return Err(UsageError::new_err(problem));
             }
-            return self.add_fit(py, &name, fit.get(), given);
+            return self.add_fit(py, &name, fit.get(), given, keep_render);
         }
         if files.is_empty() && given != Details::default() {
             let problem = "details belong to a file or a fit; give one, or leave the details out";
@@ -241,10 +374,52 @@ impl Database {
         Ok(added.iter().map(|one| format!("{}@{}", one.slug, one.added.revision())).collect())
     }
 
+    /// The materials of the file, sorted by name: a dictionary each, as `matdb list --json` prints.
+    ///
+    /// Parameters
+    /// ----------
+    /// most : int, optional
+    ///     How many at most; all unless stated.
+    /// **filter
+    ///     What must hold of them: `frequency_ghz` at which their numbers are claimed, a `tag`, the `kind` of what scenes render
+    ///     (`measured`, `literature`, `modelled` or `synthetic`), the `material_class`, whether one is `fitted` to a curve, and
+    ///     the `status` (`active`, `superseded` or `withdrawn`).
+    #[pyo3(signature = (*, most = None, **filter))]
+    fn materials<'py>(
+        &self,
+        py: Python<'py>,
+        most: Option<u32>,
+        filter: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let filter = filter_of(filter)?;
+        let list = py.detach(|| {
+            let store = self.read()?;
+            MaterialList::new(&filter, most.unwrap_or(u32::MAX), store.as_ref())
+        });
+        let list = list.map_err(raised)?;
+        to_python(py, &list.rows.iter().map(|row| &row.summary).collect::<Vec<_>>())
+    }
+
     /// The materials with these words, the best first: a dictionary each, as `matdb search --json` prints.
-    #[pyo3(signature = (words, *, most = 20))]
-    fn search<'py>(&self, py: Python<'py>, words: &str, most: u32) -> PyResult<Bound<'py, PyAny>> {
-        let hits = py.detach(|| MaterialSearch { words, most }.run(&self.database()));
+    ///
+    /// Parameters
+    /// ----------
+    /// words : str
+    ///     All of them must be there; the last may be a beginning.
+    /// most : int, default 20
+    ///     How many at most.
+    /// **filter
+    ///     As for `materials`: `db.search("paint", frequency_ghz=300)`.
+    #[pyo3(signature = (words, *, most = 20, **filter))]
+    fn search<'py>(
+        &self,
+        py: Python<'py>,
+        words: &str,
+        most: u32,
+        filter: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let filter = &filter_of(filter)?;
+        let hits = py.detach(|| MaterialSearch { words, filter, most }.run(&self.database()));
         to_python(py, &hits.map_err(raised)?)
     }
 
@@ -307,34 +482,54 @@ impl Database {
         to_python(py, &record)
     }
 
-    /// The materials nearest to the longest curve of a material, as `matdb near --json` prints them.
+    /// The materials nearest to a curve, as `matdb near --json` prints them.
     ///
     /// Parameters
     /// ----------
-    /// material : str
-    ///     `NAME` or `NAME@REVISION`.
+    /// material : str, optional
+    ///     The longest curve of this material, `NAME` or `NAME@REVISION`.
+    /// curve : Measurement, str or os.PathLike, optional
+    ///     A curve that was measured, or its CSV file, in place of a material.
+    /// columns : dict of str to str, optional
+    ///     Our names for columns of the file, as in `{"inc": "theta_deg"}`; `-` passes one over.
     /// measured_at_ghz : float, optional
     ///     Frequency of the curve, GHz; that of its instrument unless stated.
     /// shape : bool, default False
     ///     Rank by shape, for a curve of unknown level.
     /// most : int, default 10
     ///     How many at most.
-    #[pyo3(signature = (material, *, measured_at_ghz = None, shape = false, most = 10))]
+    /// **filter
+    ///     As for `materials`.
+    #[pyo3(signature = (material = None, *, curve = None, columns = None, measured_at_ghz = None, shape = false, most = 10,
+                        **filter))]
+    #[expect(clippy::too_many_arguments, reason = "each is a keyword in Python")]
     fn near<'py>(
         &self,
         py: Python<'py>,
-        material: &str,
+        material: Option<&str>,
+        curve: Option<&Bound<'py, PyAny>>,
+        columns: Option<&Bound<'py, PyDict>>,
         measured_at_ghz: Option<f64>,
         shape: bool,
         most: usize,
+        filter: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
+        let filter = filter_of(filter)?;
+        let frequency_hz = measured_at_ghz.map(frequency_hz).transpose()?;
+        let given = match (material, curve) {
+            (Some(_), None) => None,
+            (None, Some(curve)) => Some(curve_of(curve, columns, frequency_hz)?),
+            _ => return Err(UsageError::new_err("give a material, or a curve")),
+        };
         let report = py.detach(|| {
             let store = Store::open_existing(&self.path)?;
-            let frequency_hz = measured_at_ghz.map(|ghz| ghz * 1e9);
-            let search = NeighbourSearch::of_material(material, frequency_hz, store.as_ref())?;
+            let name = material.unwrap_or_default();
+            let search = match given {
+                Some(search) => search,
+                None => NeighbourSearch::of_material(name, frequency_hz, store.as_ref())?,
+            };
             let rank = if shape { Rank::Shape } else { Rank::Level };
             let is_refused = search.illumination.relative && !shape;
-            let filter = Filter::default();
             (!is_refused).then(|| search.run(store.as_ref(), &filter, rank, most)).transpose()
         });
         let relative = "the levels of the curve are relative; rank by shape (shape=True)";
@@ -382,9 +577,9 @@ impl Database {
     /// path : str or os.PathLike
     ///     The file; tables that belong to it get its name.
     /// format : str
-    ///     `csv`, `universal-brdf`, `open-material`, `mitsuba` or `sionna`.
+    ///     `csv`, `parquet` (of a wheel that was built with it), `universal-brdf`, `open-material`, `mitsuba` or `sionna`.
     /// curve : str, optional
-    ///     Name of the curve of `csv`.
+    ///     Name of the curve; what scenes render, else the one that was fitted, unless stated.
     #[pyo3(signature = (name, path, *, format, curve = None))]
     fn export<'py>(
         &self,
@@ -396,12 +591,13 @@ impl Database {
     ) -> PyResult<Bound<'py, PyAny>> {
         let format = match format {
             "csv" => Format::Csv,
+            "parquet" => Format::Parquet,
             "universal-brdf" => Format::UniversalBrdf,
             "open-material" => Format::OpenMaterial,
             "mitsuba" => Format::Mitsuba,
             "sionna" => Format::Sionna,
             other => {
-                let known = "csv, universal-brdf, open-material, mitsuba or sionna";
+                let known = "csv, parquet, universal-brdf, open-material, mitsuba or sionna";
                 return Err(no_choice("format", other, known));
             }
         };

@@ -1,47 +1,42 @@
 //! What a model lacks.
 
-use std::path::{Path, PathBuf};
+use std::path::{Path, PathBuf, absolute};
 
-use matdb::adopt::{CheckedRequest, CloudRequest, Earlier, Publication, input};
-use matdb::diagnose::Report;
-use matdb::effects::{Effect, find};
+use matdb::adopt::{
+    CheckedRequest, CloudRequest, Earlier, Publication, check_folder, input, moved_scene,
+};
+use matdb::effects::find;
 use matdb::error::Error;
 use matdb::files::{folder_of, write_all};
-use matdb::material::Input;
+use matdb::report::EffectHelp;
 use matdb::setup::{self, ReadyScene};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyTuple};
 use serde_json::{Value, json};
 
 use crate::cloud::CloudLike;
 use crate::database::Database;
 use crate::error::{UsageError, raised};
 use crate::interrupt::interruptible;
-use crate::json::to_python;
+use crate::json::{of_text, text_of, to_python};
 use crate::scene::{Scene, SceneLike};
 
 /// Name and bytes of a file.
 type File = (String, Vec<u8>);
 
-/// What was diagnosed, as it was then: a cloud, and the scene that was measured with its materials.
-struct Subject {
-    cloud: PathBuf,
-    ready: ReadyScene,
-    scene_text: String,
-    /// Names and hashes of cloud and scene.
-    given: Vec<Input>,
-    /// Those to try; all where there are none.
-    effects: Vec<&'static dyn Effect>,
-    seed: u64,
-    controls: bool,
-}
-
 /// What a scene lacks to explain a cloud.
 #[pyclass(frozen, module = "matdb")]
 pub(crate) struct Diagnosis {
-    subject: Subject,
-    found: Report,
     record: Value,
+    /// The report as one page that stands alone.
+    page: Vec<u8>,
+    /// The files for a folder. Scenes among them name others as seen from `from`.
+    files: Vec<File>,
+    /// The folder in which the diagnosis was made.
+    from: PathBuf,
+    /// Cloud and scene, and the files that the scene names.
+    read: Vec<PathBuf>,
 }
 
 /// Finds the physical effects that a scene lacks to explain a measured cloud, on all cores. Ctrl-C ends it.
@@ -54,8 +49,10 @@ pub(crate) struct Diagnosis {
 ///     The scene that was measured.
 /// db : Database, optional
 ///     Where materials are looked for; without it, and for those that it does not have, the built-in ones.
+/// receiver : str, optional
+///     The receiver of the scene that the cloud is of; the radar itself unless stated.
 /// effects : list of str, optional
-///     Names of the effects to try; all unless stated.
+///     Names of the effects to try; all unless stated. `matdb.effects()` lists them.
 /// seed : int, default 0
 /// controls : bool, default True
 ///     Whether controls are computed, which take as long as the diagnosis.
@@ -69,12 +66,14 @@ pub(crate) struct Diagnosis {
 /// matdb.DiagnoseError
 ///     Too few data, or data that are not of this scene.
 #[pyfunction]
-#[pyo3(signature = (cloud, scene, *, db = None, effects = Vec::new(), seed = 0, controls = true))]
+#[pyo3(signature = (cloud, scene, *, db = None, receiver = None, effects = Vec::new(), seed = 0, controls = true))]
+#[expect(clippy::too_many_arguments, reason = "each is a keyword in Python")]
 pub(crate) fn diagnose(
     py: Python<'_>,
     cloud: CloudLike,
     scene: SceneLike,
     db: Option<&Database>,
+    receiver: Option<&str>,
     effects: Vec<String>,
     seed: u64,
     controls: bool,
@@ -85,74 +84,85 @@ pub(crate) fn diagnose(
         find(name).ok_or_else(unknown)
     });
     let effects = effects.collect::<PyResult<Vec<_>>>()?;
+    let scene = scene.get();
     let answer = interruptible(py, |stop| {
-        let subject =
-            Subject::new(&cloud, scene.get(), database.as_ref(), effects, seed, controls)?;
-        let checked = subject.check(Path::new(""))?;
+        let request = CloudRequest {
+            cloud: cloud.path(),
+            scene: scene.path(),
+            further: &[],
+            receiver,
+            effects: &effects,
+            material: None,
+            seed,
+            controls,
+            folder: Path::new(""),
+            add: false,
+        };
+        let checked = check(request, scene, database.as_ref())?;
+        let given = vec![cloud.input()?, input(scene.path(), scene.own_text().as_bytes())];
+        let checked = CheckedRequest { given, ..checked };
         let clouds = checked.read_clouds(|_, _| Ok(cloud.read()?.into_owned()))?;
         let found = checked.diagnose(&clouds, &|_| stop.check())?;
         let notices = checked.notices();
-        let record = json!(publication(&checked, &found, &notices).report().record());
-        drop(checked);
-        Ok(Diagnosis { subject, found, record })
+        let words = ["matdb".to_owned(), "matdb diagnose".to_owned()];
+        let publication = Publication::new(&checked, &found, &notices, words);
+        let whole = |path: PathBuf| absolute(&path).unwrap_or(path);
+        Ok(Diagnosis {
+            record: json!(publication.report().record()),
+            page: publication.page_alone()?,
+            files: publication.files()?,
+            from: whole(PathBuf::from(".")),
+            read: checked.files_read().into_iter().map(whole).collect(),
+        })
     })?;
     answer.map_err(raised::<Error>)
 }
 
-impl Subject {
-    fn new(
-        cloud: &CloudLike,
-        scene: &Scene,
-        database: Option<&setup::Database>,
-        effects: Vec<&'static dyn Effect>,
-        seed: u64,
-        controls: bool,
-    ) -> Result<Subject, Error> {
-        let store = database.map(setup::Database::read).transpose()?.flatten();
-        let ready = ReadyScene::new(scene.scene().clone(), scene.path(), store.as_ref())?;
-        let scene_text = scene.own_text().to_owned();
-        let given = vec![cloud.input()?, input(scene.path(), scene_text.as_bytes())];
-        let cloud = cloud.path().to_owned();
-        Ok(Subject { cloud, ready, scene_text, given, effects, seed, controls })
-    }
-
-    /// The request, with its report in a folder.
-    fn check<'a>(&'a self, folder: &'a Path) -> Result<CheckedRequest<'a>, Error> {
-        let request = CloudRequest {
-            cloud: &self.cloud,
-            scene: &self.ready.path,
-            further: &[],
-            receiver: None,
-            effects: &self.effects,
-            material: None,
-            seed: self.seed,
-            controls: self.controls,
-            folder,
-            add: false,
-        };
-        let checked = request.check_ready(self.ready.clone(), self.scene_text.clone(), None)?;
-        Ok(CheckedRequest { given: self.given.clone(), ..checked })
-    }
+/// The request, of a scene with its materials.
+fn check<'a>(
+    request: CloudRequest<'a>,
+    scene: &Scene,
+    database: Option<&setup::Database>,
+) -> Result<CheckedRequest<'a>, Error> {
+    let store = database.map(setup::Database::read).transpose()?.flatten();
+    let ready = ReadyScene::new(scene.scene().clone(), scene.path(), store.as_ref())?;
+    request.check_ready(ready, scene.own_text().to_owned(), store.as_ref())
 }
 
-/// The files and words of a diagnosis.
-fn publication<'a>(
-    checked: &'a CheckedRequest,
-    report: &'a Report,
-    notices: &'a [String],
-) -> Publication<'a> {
-    let words = ["matdb".to_owned(), "matdb diagnose".to_owned()];
-    Publication::new(checked, report, notices, words)
+/// The physical effects that `diagnose` looks for: what each is, how it shows, and its numbers, as `matdb effects --json` prints
+/// them.
+///
+/// Parameters
+/// ----------
+/// name : str, optional
+///     Only those of this name.
+///
+/// Returns
+/// -------
+/// list of dict
+#[pyfunction]
+#[pyo3(signature = (name = None))]
+pub(crate) fn effects<'py>(py: Python<'py>, name: Option<&str>) -> PyResult<Bound<'py, PyAny>> {
+    let mut all = EffectHelp::all();
+    all.retain(|effect| name.is_none_or(|name| effect.name == name));
+    match name {
+        Some(name) if all.is_empty() => {
+            let problem = format!("there is no effect `{name}`; matdb.effects() lists them");
+            Err(UsageError::new_err(problem))
+        }
+        _ => to_python(py, &all),
+    }
 }
 
 impl Diagnosis {
-    /// The files of its report, for a folder, and what an earlier one left there.
-    fn files(&self, folder: &Path) -> Result<(Vec<File>, Earlier), Error> {
-        let checked = self.subject.check(folder)?;
-        checked.check_output()?;
-        let notices = checked.notices();
-        let files = publication(&checked, &self.found, &notices).files()?;
-        Ok((files, Earlier::in_folder(folder, &checked.request.inputs())))
+    /// Its files for a folder.
+    fn files_for(&self, folder: &Path) -> Result<Vec<File>, Error> {
+        let files = self.files.iter().map(|(name, bytes)| {
+            let is_scene = name.starts_with("after") && name.ends_with(".toml");
+            let moved = || moved_scene(bytes, &self.from, folder);
+            Ok((name.clone(), if is_scene { moved()? } else { bytes.clone() }))
+        });
+        files.collect()
     }
 
     fn value<'py>(&self, py: Python<'py>, path: &str) -> PyResult<Bound<'py, PyAny>> {
@@ -193,20 +203,19 @@ impl Diagnosis {
 
     /// Writes the report for a person as one page that stands alone.
     fn report(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        let written = py.detach(|| {
-            let checked = self.subject.check(folder_of(&path))?;
-            let notices = checked.notices();
-            let page = publication(&checked, &self.found, &notices).page_alone()?;
-            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            Ok(write_all(folder_of(&path), &[(name, page)])?)
-        });
-        written.map_err(raised::<Error>)
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        py.detach(|| write_all(folder_of(&path), &[(name, self.page.clone())])).map_err(raised)
     }
 
-    /// Writes the files that `matdb diagnose` writes, all or none, in the place of those of an earlier diagnosis.
+    /// Writes the files that `matdb diagnose` writes, all or none, in the place of those of an earlier diagnosis. Its page
+    /// names them without the folder.
     fn save(&self, py: Python<'_>, folder: PathBuf) -> PyResult<()> {
         let written = py.detach(|| {
-            let (files, earlier) = self.files(&folder)?;
+            let files = self.files_for(&folder)?;
+            let read: Vec<&Path> = self.read.iter().map(PathBuf::as_path).collect();
+            let inputs = files.iter().map(|(name, _)| name).filter(|name| name.ends_with(".toml"));
+            check_folder(&folder, &read, &inputs.cloned().collect::<Vec<_>>())?;
+            let earlier = Earlier::in_folder(&folder, &read);
             write_all(&folder, &files)?;
             earlier.remove_all_but(&files);
             Ok(())
@@ -220,5 +229,32 @@ impl Diagnosis {
         let effects = self.record["effects"].as_array().into_iter().flatten();
         let names: Vec<&str> = effects.filter_map(|one| one["name"].as_str()).collect();
         Ok(format!("<matdb.Diagnosis: {verdict} {}>", names.join(", ")).replace(" >", ">"))
+    }
+
+    /// A diagnosis of its parts, as pickle makes one.
+    #[staticmethod]
+    fn _of_parts(
+        record: &str,
+        page: &Bound<'_, PyBytes>,
+        files: Vec<(String, Bound<'_, PyBytes>)>,
+        from_folder: PathBuf,
+        read: Vec<PathBuf>,
+    ) -> PyResult<Diagnosis> {
+        let files = files.into_iter().map(|(name, bytes)| (name, bytes.as_bytes().to_vec()));
+        Ok(Diagnosis {
+            record: of_text(record)?,
+            page: page.as_bytes().to_vec(),
+            files: files.collect(),
+            from: from_folder,
+            read,
+        })
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let (py, Diagnosis { record, page, files, from, read }) = (slf.py(), slf.get());
+        let files = files.iter().map(|(name, bytes)| (name, PyBytes::new(py, bytes)));
+        let page = PyBytes::new(py, page);
+        let parts = (text_of(record)?, page, Vec::from_iter(files), from, read);
+        (slf.get_type().getattr("_of_parts")?, parts).into_pyobject(py)
     }
 }

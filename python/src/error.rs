@@ -7,6 +7,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use pyo3::{PyErr, create_exception};
 
+use crate::words::in_python;
+
 create_exception!(
     matdb,
     Error,
@@ -30,7 +32,7 @@ create_exception!(matdb, FitError, Error, "A curve cannot be fitted.");
 create_exception!(matdb, DiagnoseError, Error, "Nothing can be said about a cloud or a curve.");
 create_exception!(matdb, CatalogueError, Error, "A catalogue cannot be published or taken over.");
 
-/// The exception for an error of the library, with the sentence of the command line.
+/// The exception for an error of the library, with the sentence of the command line and keywords in the place of its flags.
 pub(crate) fn raised<Refused: Into<matdb::error::Error>>(error: Refused) -> PyErr {
     let error = error.into();
     Python::attach(|py| exception(py, &error).unwrap_or_else(|failed| failed))
@@ -38,7 +40,7 @@ pub(crate) fn raised<Refused: Into<matdb::error::Error>>(error: Refused) -> PyEr
 
 fn exception(py: Python<'_>, error: &matdb::error::Error) -> PyResult<PyErr> {
     use matdb::error::Error as E;
-    let sentence = matdb::cli::message(error);
+    let sentence = in_python(&matdb::cli::message(error));
     let hint = sentence.rsplit_once("; ").map(|(_, hint)| hint.to_owned());
     let kind = match error {
         // This one is a KeyError, too.
@@ -92,7 +94,7 @@ pub(crate) fn no_choice(key: &str, given: &str, known: &str) -> PyErr {
 pub(crate) fn warn(py: Python<'_>, notices: &[String]) -> PyResult<()> {
     let warnings = py.import("warnings")?;
     for notice in notices {
-        let words = PyTuple::new(py, [notice.into_pyobject(py)?])?;
+        let words = PyTuple::new(py, [in_python(notice).into_pyobject(py)?])?;
         warnings.call_method1("warn", words)?;
     }
     Ok(())

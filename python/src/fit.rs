@@ -2,30 +2,36 @@
 
 use std::path::PathBuf;
 
-use matdb::adopt::{FitMethod, FitOutcome, FitRequest, FitSubject};
+use matdb::adopt::{FitMethod, FitOutcome, FitRequest, FitSubject, NewFit};
 use matdb::error::Error;
-use matdb::fit::FitResult;
+use matdb::formats::ColumnNames;
+use matdb::material::FitReport;
 use matdb::setup;
 use matdb::units::{db_from_ratio, watts_from_dbm};
 use numpy::{PyArray1, PyArray2, PyArrayLike1};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
-use serde_json::json;
+use pyo3::types::{PyDict, PyTuple};
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 
+use crate::cloud::column_names;
 use crate::database::Database;
 use crate::error::{no_choice, raised};
-use crate::json::to_python;
-use crate::material::sigma0_db;
-use crate::measure::Instrument;
+use crate::json::{of_text, text_of, to_python};
+use crate::material::{Material, sigma0_db};
+use crate::measure::{Instrument, Measurement};
+use crate::words::in_python;
 
 /// A model that was fitted to a curve.
 #[pyclass(frozen, module = "matdb")]
+#[derive(Serialize, Deserialize)]
 pub(crate) struct Fit {
-    pub(crate) result: FitResult,
+    pub(crate) fit: NewFit,
     pub(crate) subject: FitSubject,
-    pub(crate) fit_name: String,
     /// What a curve was measured with that was measured here.
     pub(crate) measured: Option<Instrument>,
+    record: Value,
     notices: Vec<String>,
 }
 
@@ -35,79 +41,29 @@ const ALSO: [(&str, &str); 2] = [
     ("cook-torrance-ggx + blinn-phong", "mixture-ggx"),
 ];
 
-/// A curve to fit: by name, or as it was measured with a radar.
-pub(crate) enum What<'a> {
-    Named(&'a str),
-    Curve(Box<FitSubject>, Instrument),
+/// A curve to fit as an argument.
+pub(crate) enum What {
+    Named(String),
+    Measured(Py<Measurement>),
+    Material(Py<Material>),
 }
 
-/// How to fit, as Python says it.
-pub(crate) struct Request<'a, 'py> {
-    pub(crate) model: Option<&'a str>,
-    pub(crate) method: &'a str,
-    pub(crate) curve: Option<&'a str>,
-    pub(crate) fixed: Option<&'a Bound<'py, PyDict>>,
-    pub(crate) looks: Option<f64>,
-    pub(crate) noise_dbm: Option<f64>,
-    pub(crate) starts: Option<usize>,
-    pub(crate) seed: Option<u64>,
-}
+impl<'py> FromPyObject<'_, 'py> for What {
+    type Error = PyErr;
 
-impl Request<'_, '_> {
-    /// Fits; materials are looked for in a database.
-    pub(crate) fn run(
-        &self,
-        py: Python<'_>,
-        what: What<'_>,
-        db: Option<&Database>,
-    ) -> PyResult<Fit> {
-        let Request { curve, looks, noise_dbm, starts, seed, .. } = *self;
-        let method = match self.method {
-            "censored" => FitMethod::Censored,
-            "tls" => FitMethod::Tls,
-            "tls-tail" => FitMethod::TlsTail,
-            "mse" => FitMethod::Mse,
-            other => return Err(no_choice("method", other, "censored, tls, tls-tail or mse")),
-        };
-        let fixed = self.fixed.map_or(Ok(Vec::new()), |fixed| {
-            let held = fixed.iter().map(|(path, value)| Ok((path.extract()?, value.extract()?)));
-            held.collect::<PyResult<Vec<(String, f64)>>>()
-        })?;
-        let own = |name: &str| ALSO.into_iter().find(|(other, _)| *other == name);
-        let model = self.model.map(|name| own(name).map_or(name, |(_, own)| own));
-        let database = db.map_or_else(|| setup::Database::new(None), Database::database);
-        let fitted = py.detach(|| {
-            // Without a database, one that happens to lie in the working directory is not read.
-            let store = db.map(|_| database.read()).transpose()?.flatten();
-            let (name, given) = match what {
-                What::Named(name) => (name, None),
-                What::Curve(subject, instrument) => ("", Some((*subject, instrument))),
-            };
-            let usual = FitRequest::new(name);
-            let request = FitRequest {
-                model,
-                method,
-                curve,
-                fixed,
-                looks,
-                noise_w: noise_dbm.map(watts_from_dbm),
-                starts: starts.unwrap_or(usual.starts),
-                seed: seed.unwrap_or(usual.seed),
-                ..usual
-            };
-            let (checked, measured) = match given {
-                None => (request.check(store.as_ref())?, None),
-                Some((subject, instrument)) => {
-                    (request.check_subject(subject, store.as_ref())?, Some(instrument))
-                }
-            };
-            let (notices, fit_name) = (checked.notices.clone(), checked.fit_name.clone());
-            drop(store);
-            let FitOutcome { subject, result, refusal, .. } = checked.run(&database)?;
-            let fit = Fit { result, subject, fit_name, measured, notices };
-            refusal.map_or(Ok(fit), Err)
+    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<What> {
+        if let Ok(measured) = given.cast::<Measurement>() {
+            return Ok(What::Measured(measured.to_owned().unbind()));
+        }
+        if let Ok(material) = given.cast::<Material>() {
+            return Ok(What::Material(material.to_owned().unbind()));
+        }
+        let name = given.extract::<PathBuf>().map_err(|_| {
+            PyTypeError::new_err(
+                "give a matdb.Measurement, a matdb.Material, its name, or the file of a curve",
+            )
         });
-        fitted.map_err(raised::<Error>)
+        Ok(What::Named(name?.to_string_lossy().into_owned()))
     }
 }
 
@@ -115,8 +71,8 @@ impl Request<'_, '_> {
 ///
 /// Parameters
 /// ----------
-/// what : str or os.PathLike
-///     A curve's CSV file, or `NAME` or `NAME@REVISION` of a material with a curve.
+/// what : Measurement, Material, str or os.PathLike
+///     A curve that was measured, a material with a curve or its name, `NAME` or `NAME@REVISION`, or a curve's CSV file.
 /// db : Database, optional
 ///     Where materials are looked for; without it, and for those that it does not have, the built-in ones.
 /// model : str, optional
@@ -125,14 +81,23 @@ impl Request<'_, '_> {
 ///     `censored`, `tls`, `tls-tail` (which takes the exponent of the tail as `fixed`) or `mse`.
 /// curve : str, optional
 ///     Curve of the material; the longest unless stated.
+/// columns : dict of str to str, optional
+///     Our names for columns of the file, as in `{"inc": "theta_deg"}`; `-` passes one over.
 /// fixed : dict of str to float, optional
 ///     Parameters that are held, by path.
 /// looks : float, optional
 ///     Looks of the speckle; found by the fit unless stated.
 /// noise_dbm : float, optional
 ///     Thermal noise in each chirp, dBm.
+/// theta_sd_deg, level_sd_db : float, optional
+///     Standard deviations of the angle, degrees, and of the level, dB, for `tls`; that of the curve, and that of speckle of one
+///     look, unless stated.
+/// split_deg : float, optional
+///     Angle between the specular and the diffuse piece of `mse`, degrees; 6 unless stated.
 /// starts, seed : int, optional
 ///     Points that the search starts from, and their seed.
+/// fit_name : str, optional
+///     Its name in a material; `MODEL-METHOD` unless stated.
 ///
 /// Returns
 /// -------
@@ -143,33 +108,109 @@ impl Request<'_, '_> {
 /// matdb.Error
 ///     A curve, material, model or parameter that is not known; a search that fails.
 #[pyfunction]
-#[pyo3(signature = (what, *, db = None, model = None, method = "censored", curve = None, fixed = None, looks = None,
-                    noise_dbm = None, starts = None, seed = None))]
+#[pyo3(signature = (what, *, db = None, model = None, method = "censored", curve = None, columns = None, fixed = None,
+                    looks = None, noise_dbm = None, theta_sd_deg = None, level_sd_db = None, split_deg = None,
+                    starts = None, seed = None, fit_name = None))]
 #[expect(clippy::too_many_arguments, reason = "each is a keyword in Python")]
 pub(crate) fn fit(
     py: Python<'_>,
-    what: PathBuf,
+    what: What,
     db: Option<&Database>,
     model: Option<&str>,
     method: &str,
     curve: Option<&str>,
+    columns: Option<&Bound<'_, PyDict>>,
     fixed: Option<&Bound<'_, PyDict>>,
     looks: Option<f64>,
     noise_dbm: Option<f64>,
+    theta_sd_deg: Option<f64>,
+    level_sd_db: Option<f64>,
+    split_deg: Option<f64>,
     starts: Option<usize>,
     seed: Option<u64>,
+    fit_name: Option<&str>,
 ) -> PyResult<Fit> {
-    let request = Request { model, method, curve, fixed, looks, noise_dbm, starts, seed };
-    request.run(py, What::Named(&what.to_string_lossy()), db)
+    let method = match method {
+        "censored" => FitMethod::Censored,
+        "tls" => FitMethod::Tls,
+        "tls-tail" => FitMethod::TlsTail,
+        "mse" => FitMethod::Mse,
+        other => return Err(no_choice("method", other, "censored, tls, tls-tail or mse")),
+    };
+    let fixed = fixed.map_or(Ok(Vec::new()), |fixed| {
+        let held = fixed.iter().map(|(path, value)| Ok((path.extract()?, value.extract()?)));
+        held.collect::<PyResult<Vec<(String, f64)>>>()
+    })?;
+    let columns = columns.map_or(Ok(ColumnNames::default()), column_names)?;
+    let own = |name: &str| ALSO.into_iter().find(|(other, _)| *other == name);
+    let model = model.map(|name| own(name).map_or(name, |(_, own)| own));
+    let database = db.map_or_else(|| setup::Database::new(None), Database::database);
+    let fitted = py.detach(|| {
+        // Without a database, one that happens to lie in the working directory is not read.
+        let store = db.map(|_| database.read()).transpose()?.flatten();
+        let usual = FitRequest::new("");
+        let request = FitRequest {
+            model,
+            method,
+            curve,
+            columns,
+            fixed,
+            looks,
+            noise_w: noise_dbm.map(watts_from_dbm),
+            theta_sd_rad: theta_sd_deg.map(f64::to_radians),
+            level_sd_db,
+            split_rad: split_deg.map_or(usual.split_rad, f64::to_radians),
+            starts: starts.unwrap_or(usual.starts),
+            seed: seed.unwrap_or(usual.seed),
+            fit_name,
+            ..usual
+        };
+        let (checked, measured) = match &what {
+            What::Named(name) => {
+                let request = FitRequest { what: name, ..request };
+                (request.check(store.as_ref())?, None)
+            }
+            What::Measured(measured) => {
+                let (subject, instrument) = measured.get().subject();
+                (request.check_subject(subject, store.as_ref())?, Some(instrument))
+            }
+            What::Material(material) => {
+                let found = material.get().found().clone();
+                let name = found.material.slug.to_string();
+                let subject = FitSubject::of_material(&name, curve, found)?;
+                (request.check_subject(subject, store.as_ref())?, None)
+            }
+        };
+        let notices = checked.notices.clone();
+        drop(store);
+        let FitOutcome { subject, result, fit, refusal, .. } = checked.run(&database)?;
+        let mut record = json!(result);
+        record["sentences"] = json!(fit.fit.report.as_ref().map(|report| &report.verdict));
+        let fitted = Fit { fit, subject, measured, record, notices };
+        refusal.map_or(Ok(fitted), Err)
+    });
+    fitted.map_err(raised::<Error>)
+}
+
+impl Fit {
+    fn report(&self) -> Option<&FitReport> {
+        self.fit.fit.report.as_ref()
+    }
 }
 
 #[pymethods]
 impl Fit {
+    /// Its name in a material that it is added to.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.fit.fit.name
+    }
+
     /// Values of the parameters by path, in their own units.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let values = PyDict::new(py);
-        for parameter in self.result.model.parameters() {
+        for parameter in self.fit.fit.model.parameters() {
             values.set_item(parameter.path, parameter.value)?;
         }
         Ok(values)
@@ -178,14 +219,16 @@ impl Fit {
     /// Names of the fitted numbers, in the order of `covariance`.
     #[getter]
     fn names(&self) -> Vec<&str> {
-        self.result.estimates.iter().map(|one| one.name.as_str()).collect()
+        let estimates = self.report().into_iter().flat_map(|report| &report.estimates);
+        estimates.map(|one| one.name.as_str()).collect()
     }
 
     /// Covariance of the fitted numbers: float64 (n, n), 0 for those at a bound, without directions that the curve does
     /// not determine.
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        Ok(PyArray2::from_vec2(py, &self.result.covariance)?)
+        let rows = self.report().map_or(&[][..], |report| &report.covariance);
+        Ok(PyArray2::from_vec2(py, rows)?)
     }
 
     /// The curve and the fitted law over it, on axes of matplotlib.
@@ -219,14 +262,15 @@ impl Fit {
 
     /// What limits the use of the fit, a sentence each: what the curve cannot tell apart, and bounds that were met.
     #[getter]
-    fn verdict(&self) -> Vec<String> {
-        self.result.verdict.iter().map(ToString::to_string).collect()
+    fn verdict(&self) -> Vec<&str> {
+        let sentences = self.report().into_iter().flat_map(|report| &report.verdict);
+        sentences.map(String::as_str).collect()
     }
 
     /// What a person should not overlook of the curve, a sentence each.
     #[getter]
     fn notices(&self) -> Vec<String> {
-        self.notices.clone()
+        self.notices.iter().map(|notice| in_python(notice)).collect()
     }
 
     /// Backscatter of the fitted law, dB, as `Material.sigma0_db`.
@@ -235,17 +279,26 @@ impl Fit {
         py: Python<'py>,
         theta_deg: PyArrayLike1<'py, f64, numpy::AllowTypeChange>,
     ) -> Bound<'py, PyArray1<f64>> {
-        sigma0_db(py, &self.result.model, &theta_deg)
+        sigma0_db(py, &self.fit.fit.model, &theta_deg)
     }
 
     /// All numbers with their deviations, as `matdb fit --json` prints them.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let mut record = json!(self.result);
-        record["sentences"] = json!(self.verdict());
-        to_python(py, &record)
+        to_python(py, &self.record)
     }
 
     fn __repr__(&self) -> String {
-        format!("<matdb.Fit of {} to {}>", self.fit_name, self.subject.label)
+        format!("<matdb.Fit of {} to {}>", self.name(), self.subject.label)
+    }
+
+    /// A fit of its text, as pickle makes one.
+    #[staticmethod]
+    fn _of_text(text: &str) -> PyResult<Fit> {
+        of_text(text)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let text = text_of(slf.get())?;
+        (slf.get_type().getattr("_of_text")?, (text,)).into_pyobject(slf.py())
     }
 }

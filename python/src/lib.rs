@@ -3,6 +3,7 @@
 
 #![warn(missing_docs)]
 
+mod arrow;
 mod cloud;
 mod command;
 mod compare;
@@ -14,8 +15,11 @@ mod interrupt;
 mod json;
 mod material;
 mod measure;
+mod pose;
 mod scan;
 mod scene;
+mod table;
+mod words;
 
 /// The extension module, which `matdb/__init__.py` shows to users.
 #[pyo3::pymodule(gil_used = false)]
@@ -29,9 +33,9 @@ mod _matdb {
     #[pymodule_export]
     use crate::compare::{Comparison, calibrate, compare};
     #[pymodule_export]
-    use crate::database::{Database, open};
+    use crate::database::{Database, open, verify};
     #[pymodule_export]
-    use crate::diagnose::{Diagnosis, diagnose};
+    use crate::diagnose::{Diagnosis, diagnose, effects};
     #[pymodule_export]
     use crate::error::{
         CatalogueError, CloudError, DiagnoseError, Error, FileError, FitError, MaterialError,
@@ -47,6 +51,8 @@ mod _matdb {
     use crate::scan::{Page, Scan, View, render};
     #[pymodule_export]
     use crate::scene::{Scene, load_scene};
+    #[pymodule_export]
+    use crate::table::Table;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

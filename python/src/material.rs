@@ -1,23 +1,58 @@
 //! A material.
 
 use matdb::brdf::{Brdf, Scattering};
+use matdb::material::{MaterialError, SampledMaterial, Slug};
 use matdb::setup::MaterialRevision;
 use matdb::units::db_from_ratio;
 use numpy::{PyArray1, PyArrayLike1};
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 
-use crate::error::raised;
-use crate::json::to_python;
+use crate::error::{UsageError, raised, warn};
+use crate::json::{of_text, text_of, to_python};
 
-/// A material in one revision.
+/// A material in one revision; or one of a function, for exploration.
+///
+/// The function is sampled once, at 1025 angles from 0 to 90 degrees and, where the curve between them is more than 0.01 dB off,
+/// at up to 16385. Scenes render the curve: speed is that of any other material. `sampling_error_db` says how far the curve is
+/// off at most, up to 89 degrees. From the angle on from which the function gives -inf or NaN, nothing comes back.
+///
+/// Parameters
+/// ----------
+/// name : str
+///     Short name: small letters, digits and hyphens.
+/// sigma0_db : callable
+///     Takes an array of angles of incidence, degrees, and gives sigma0 at each, dB.
+///
+/// Warns
+/// -----
+/// UserWarning
+///     A function that no curve follows to 0.01 dB, such as a step.
 #[pyclass(frozen, module = "matdb")]
 pub(crate) struct Material {
     found: MaterialRevision,
+    sampling_error_db: Option<f64>,
+}
+
+/// Why a function is no material.
+enum Refused {
+    ByPython(PyErr),
+    ByMaterial(MaterialError),
+}
+
+impl From<MaterialError> for Refused {
+    fn from(error: MaterialError) -> Refused {
+        Refused::ByMaterial(error)
+    }
 }
 
 impl Material {
     pub(crate) fn new(found: MaterialRevision) -> Material {
-        Material { found }
+        Material { found, sampling_error_db: None }
+    }
+
+    pub(crate) fn found(&self) -> &MaterialRevision {
+        &self.found
     }
 }
 
@@ -33,8 +68,46 @@ pub(crate) fn sigma0_db<'py>(
     PyArray1::from_iter(py, levels_db)
 }
 
+/// The levels that a function gives at some angles. One number stands for all.
+fn levels_db(function: &Bound<'_, PyAny>, angles_deg: &[f64]) -> PyResult<Vec<f64>> {
+    let py = function.py();
+    let numpy = py.import("numpy")?;
+    let levels_db = function.call1((PyArray1::from_slice(py, angles_deg),))?;
+    let levels_db = numpy.call_method1("asarray", (levels_db, "float64"))?;
+    let levels_db = numpy.call_method1("broadcast_to", (levels_db, angles_deg.len()))?;
+    levels_db.call_method0("tolist")?.extract()
+}
+
 #[pymethods]
 impl Material {
+    #[new]
+    fn of_function(py: Python<'_>, name: &str, sigma0_db: &Bound<'_, PyAny>) -> PyResult<Material> {
+        let slug: Slug = name.parse().map_err(|problem: String| UsageError::new_err(problem))?;
+        let sampled = SampledMaterial::new(slug, |angles_deg| {
+            levels_db(sigma0_db, angles_deg).map_err(Refused::ByPython)
+        });
+        let sampled = sampled.map_err(|refused| match refused {
+            Refused::ByPython(error) => error,
+            Refused::ByMaterial(error) => raised(error),
+        });
+        let SampledMaterial { material, error_db, error_at_deg } = sampled?;
+        if error_db > 0.01 {
+            let notice = format!(
+                "{name}: between its samples the curve is up to {error_db:.2} dB off the function, at {error_at_deg:.2}°: the \
+                 function has a step there, or changes faster than the samples show"
+            );
+            warn(py, &[notice])?;
+        }
+        let found = MaterialRevision { material, revision: None };
+        Ok(Material { found, sampling_error_db: Some(error_db) })
+    }
+
+    /// How far the curve of a function is off midway between its samples, dB; None for other materials.
+    #[getter]
+    fn sampling_error_db(&self) -> Option<f64> {
+        self.sampling_error_db
+    }
+
     /// Short name.
     #[getter]
     fn name(&self) -> &str {
@@ -101,10 +174,32 @@ impl Material {
         to_python(py, &self.found.material)
     }
 
+    /// Backscatter over the angle of incidence, on axes of matplotlib.
+    #[pyo3(signature = (ax = None))]
+    fn plot<'py>(
+        slf: &Bound<'py, Self>,
+        ax: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("matdb._plots")?.call_method1("material", (slf, ax))
+    }
+
+    /// A material of its text, as pickle makes one.
+    #[staticmethod]
+    fn _of_text(text: &str, sampling_error_db: Option<f64>) -> PyResult<Material> {
+        Ok(Material { found: of_text(text)?, sampling_error_db })
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let Material { found, sampling_error_db } = slf.get();
+        let parts = (text_of(found)?, *sampling_error_db);
+        (slf.get_type().getattr("_of_text")?, parts).into_pyobject(slf.py())
+    }
+
     fn __repr__(&self) -> String {
-        let name = match self.found.revision {
-            Some(revision) => format!("{}@{revision}", self.name()),
-            None => format!("{}, built in", self.name()),
+        let name = match (self.found.revision, self.sampling_error_db) {
+            (Some(revision), _) => format!("{}@{revision}", self.name()),
+            (None, None) => format!("{}, built in", self.name()),
+            (None, Some(_)) => return format!("<matdb.Material {}, of a function>", self.name()),
         };
         format!("<matdb.Material {name}: {}>", self.title())
     }

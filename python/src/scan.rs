@@ -4,12 +4,14 @@ use std::path::PathBuf;
 
 use matdb::error::Error;
 use matdb::files::{folder_of, write_all};
+use matdb::formats::exr::Packing;
 use matdb::formats::ply::{Column, Scalar, Table};
 use matdb::geometry::Raster;
 use matdb::geometry::raster::Channel;
-use matdb::render::{Echo, cloud_table};
-use matdb::report::{RenderFiles, RenderRequest, rendering_page};
+use matdb::render::{Echo, RenderError, cloud_table};
+use matdb::report::{BeatShape, RenderFiles, RenderRequest, rendering_page};
 use matdb::setup::{ReadyScene, View as Received};
+use matdb::trace::{Gpu, GpuError, Tracer};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
@@ -17,9 +19,11 @@ use pyo3::types::{PyBytes, PyDict, PyTuple};
 
 use crate::cloud::Cloud;
 use crate::database::Database;
-use crate::error::{no_choice, raised};
+use crate::error::{no_choice, raised, warn};
 use crate::interrupt::interruptible;
 use crate::scene::{Scene, SceneLike};
+use crate::table;
+use crate::words::in_python;
 
 /// What one antenna received in one polarisation.
 #[pyclass(frozen, module = "matdb")]
@@ -72,7 +76,19 @@ pub(crate) struct Page {
 /// db : Database, optional
 ///     Where its materials are looked for; without it, and for those that it does not have, the built-in ones.
 /// seed : int, optional
-///     In the place of the scene's own.
+///     In the place of the scene's own. Meshes are not loaded again.
+/// all_hits : bool, default False
+///     Whether the files `cloud.ply` hold every hit, not only detections.
+/// view : bool, default False
+///     Whether there are files `view.html`, too, as `Scan.show` makes them.
+/// beat : bool, default False
+///     Whether there are files `beat.npy`, too: the beat signals of a radar with a receiver.
+/// crop : bool, default False
+///     Whether the images end a spot beyond what any antenna detected.
+/// uncompressed : bool, default False
+///     Whether `power.exr` is not compressed.
+/// tracer : str, optional
+///     How rays are traced: `pinhole`, `bvh`, `brute` or `gpu`; the fastest unless stated.
 ///
 /// Returns
 /// -------
@@ -83,41 +99,79 @@ pub(crate) struct Page {
 /// matdb.MaterialError, matdb.RenderError
 ///     Materials that are not known, and what cannot be rendered.
 #[pyfunction]
-#[pyo3(signature = (scene, *, db = None, seed = None))]
+#[pyo3(signature = (scene, *, db = None, seed = None, all_hits = false, view = false, beat = false, crop = false,
+                    uncompressed = false, tracer = None))]
+#[expect(clippy::too_many_arguments, reason = "each is a keyword in Python")]
 pub(crate) fn render(
     py: Python<'_>,
     scene: SceneLike,
     db: Option<&Database>,
     seed: Option<u64>,
+    all_hits: bool,
+    view: bool,
+    beat: bool,
+    crop: bool,
+    uncompressed: bool,
+    tracer: Option<&str>,
 ) -> PyResult<Scan> {
+    let own_tracer = match tracer {
+        None | Some("gpu") => Tracer::Automatic,
+        Some("pinhole") => Tracer::Pinhole,
+        Some("bvh") => Tracer::Bvh,
+        Some("brute") => Tracer::Brute,
+        Some(other) => return Err(no_choice("tracer", other, "pinhole, bvh, brute or gpu")),
+    };
     let mut scene = scene.scene(py)?;
     if let Some(seed) = seed {
         let changes = PyDict::new(py);
         changes.set_item("seed", seed)?;
         scene = Py::new(py, scene.get().with(py, &changes)?)?;
     }
-    let rendered = interruptible(py, |stop| Rendered::new(scene.get(), db, &|| stop.check()))?;
-    Scan::new(py, scene, rendered.map_err(raised)?)
+    let own = scene.get();
+    let rendered = interruptible(py, |stop| {
+        let store = db.map_or(Ok(None), Database::read)?;
+        let ready = ReadyScene::new(own.scene().clone(), own.path(), store.as_ref())?;
+        drop(store);
+        let gpu = match (tracer == Some("gpu")).then(Gpu::new).transpose() {
+            Err(GpuError::NoAdapter { .. }) => None,
+            gpu => {
+                gpu.map_err(|error| ready.render_error("", RenderError::Tracer(error.into())))?
+            }
+        };
+        let request = RenderRequest {
+            tracer: own_tracer,
+            gpu: gpu.as_ref(),
+            all_hits,
+            beat: beat.then(|| BeatShape::new(&ready.scene)).transpose()?,
+            view,
+            crop,
+            packing: if uncompressed { Packing::Uncompressed } else { Packing::Zip16 },
+            ..RenderRequest::new(&ready)
+        };
+        Ok((Rendered::new(&request, &|| stop.check())?, gpu.is_some()))
+    })?;
+    let (rendered, is_on_gpu) = rendered.map_err(raised::<Error>)?;
+    if tracer == Some("gpu") && !is_on_gpu {
+        warn(py, &["there is no graphics processor; traced on the processor instead".to_owned()])?;
+    }
+    Scan::new(py, scene, rendered)
 }
 
 impl Rendered {
-    fn new(
-        scene: &Scene,
-        db: Option<&Database>,
-        check: &(dyn Fn() + Sync),
-    ) -> Result<Rendered, Error> {
-        let store = db.map_or(Ok(None), Database::read)?;
-        let ready = ReadyScene::new(scene.scene().clone(), scene.path(), store.as_ref())?;
-        drop(store);
-        let RenderFiles { views, images, record, files } =
-            RenderRequest::new(&ready).render(&|_| check())?;
+    fn new(request: &RenderRequest<'_>, check: &(dyn Fn() + Sync)) -> Result<Rendered, Error> {
+        let RenderFiles { views, images, record, files } = request.render(&|_| check())?;
         let materials = record.material_names();
         let mut named = Vec::new();
         for (view, image) in std::iter::zip(&views, images) {
             check();
             let name = view.file_name("view", "");
             let name = name.trim_end_matches('.').replacen("view", "radar", 1);
-            named.push((name, table(&ready, view, &materials), image, view.scan.threshold_w));
+            named.push((
+                name,
+                table(request.ready, view, &materials),
+                image,
+                view.scan.threshold_w,
+            ));
         }
         Ok(Rendered { files, views: named, notices: record.notices(), materials })
     }
@@ -153,7 +207,7 @@ impl View {
     fn new(py: Python<'_>, table: Table, threshold_w: f64, raster: Raster) -> PyResult<View> {
         let cloud = PyDict::new(py);
         for column in table.columns {
-            let name = column.name.clone();
+            let name = with_unit(&column.name).to_owned();
             cloud.set_item(name, frozen(&array(py, column)?)?)?;
         }
         let [x_m, y_m] = [
@@ -181,12 +235,13 @@ impl View {
         })
     }
 
-    /// The cloud as numbers.
+    /// The cloud as numbers, with the names that its file has.
     fn table(&self, py: Python<'_>) -> PyResult<Table> {
         let columns = self.cloud.bind(py).iter().map(|(name, values)| {
             let values = values.call_method1("astype", ("float64",))?;
             let values = values.cast_into::<PyArray1<f64>>().map_err(PyErr::from)?.to_vec()?;
-            Ok(Column { name: name.extract()?, scalar: Scalar::Double, values })
+            let name: String = name.extract()?;
+            Ok(Column { name: without_unit(&name).to_owned(), scalar: Scalar::Double, values })
         });
         Ok(Table { comments: Vec::new(), columns: columns.collect::<PyResult<_>>()? })
     }
@@ -210,6 +265,17 @@ impl View {
     fn column<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
         self.cloud.bind(py).as_any().get_item(name)
     }
+}
+
+/// Columns of a cloud's file, as the PLY of others has them, and the same with their units.
+const PLACES: [(&str, &str); 3] = [("x", "x_m"), ("y", "y_m"), ("z", "z_m")];
+
+fn with_unit(name: &str) -> &str {
+    PLACES.iter().find(|(bare, _)| *bare == name).map_or(name, |(_, known)| known)
+}
+
+fn without_unit(name: &str) -> &str {
+    PLACES.iter().find(|(_, known)| *known == name).map_or(name, |(bare, _)| bare)
 }
 
 /// The detections of a view with every column.
@@ -272,14 +338,14 @@ impl View {
 
     /// The detections: a column each of the measured values and of what truly caused them, by name with unit.
     #[getter]
-    fn cloud<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        self.cloud.bind(py).copy()
+    fn cloud(&self, py: Python<'_>) -> table::Table {
+        table::Table::new(self.cloud.clone_ref(py))
     }
 
     /// Places of the detections in the global frame, m: float64 (n, 3).
     #[getter]
     fn xyz_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let columns = ["x", "y", "z"].map(|name| self.column(py, name));
+        let columns = PLACES.map(|(_, name)| self.column(py, name));
         let [x, y, z] = columns;
         py.import("numpy")?.call_method1("column_stack", ((x?, y?, z?),))
     }
@@ -297,7 +363,7 @@ impl View {
     }
 
     fn __len__(&self, py: Python<'_>) -> PyResult<usize> {
-        self.column(py, "x")?.len()
+        self.column(py, "x_m")?.len()
     }
 
     /// A view of its parts, as pickle makes one.
@@ -372,8 +438,8 @@ impl Scan {
 
     /// The detections of the radar's own view, as `View.cloud`.
     #[getter]
-    fn cloud<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        self.radar(py)?.get().cloud(py)
+    fn cloud(&self, py: Python<'_>) -> PyResult<table::Table> {
+        Ok(self.radar(py)?.get().cloud(py))
     }
 
     /// Places of the detections in the global frame, m: float64 (n, 3).
@@ -391,7 +457,7 @@ impl Scan {
     /// What a person should not overlook, a sentence each.
     #[getter]
     fn notices(&self) -> Vec<String> {
-        self.notices.clone()
+        self.notices.iter().map(|notice| in_python(notice)).collect()
     }
 
     /// What was rendered and of what, as `scan.json` has it.
@@ -445,6 +511,26 @@ impl Scan {
         ax: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         slf.py().import("matdb._plots")?.call_method1("scan", (slf, ax))
+    }
+
+    /// The detections as a point cloud of Open3D, coloured by power, with `power_dbm`, `range_m` and `chirp` as attributes.
+    ///
+    /// Returns
+    /// -------
+    /// open3d.t.geometry.PointCloud
+    fn to_open3d<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("matdb._extras")?.call_method1("to_open3d", (slf,))
+    }
+
+    /// Logs detections, coloured by power, and image to the recording of rerun that is open.
+    ///
+    /// Parameters
+    /// ----------
+    /// entity : str, default "matdb"
+    ///     Path of the entity that gets `points` and `power_dbm`.
+    #[pyo3(signature = (entity = "matdb"))]
+    fn to_rerun(slf: &Bound<'_, Self>, entity: &str) -> PyResult<()> {
+        slf.py().import("matdb._extras")?.call_method1("to_rerun", (slf, entity)).map(|_| ())
     }
 
     /// The picture, for a notebook.

@@ -7,15 +7,17 @@ use glam::DVec3;
 use matdb::files::{folder_of, write_all};
 use matdb::formats::ply::write_mesh;
 use matdb::geometry::Mesh;
-use matdb::scene::{self, GivenMeshes, SceneFile, read_text};
+use matdb::material::file;
+use matdb::scene::{self, GivenMaterials, GivenMeshes, SceneFile, read_text};
 use numpy::{AllowTypeChange, PyArray1, PyArrayLike2, PyArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyString, PyTuple};
 use toml::{Table, Value};
 
-use crate::error::{UsageError, raised};
-use crate::json::to_python;
+use crate::error::{UsageError, no_choice, raised};
+use crate::json::{of_text, text_of, to_python};
+use crate::material::Material;
 
 /// Radar, scan and target. It never changes; `replace` makes another.
 ///
@@ -25,8 +27,9 @@ use crate::json::to_python;
 ///     Meshes in m by name: `(vertices, facets)` of shapes (n, 3) and (k, 3), a mesh of trimesh or of Open3D, or the name of a
 ///     file or a built-in mesh. Or a dict with such a `mesh` and the other keys of `[[mesh]]`, as in `{"mesh": head,
 ///     "translation_m": [0, 1.1, 0]}`.
-/// materials : str or dict of str to str, optional
-///     The material of all meshes, or of each by its name. Without it `region` says what is made of what.
+/// materials : str, Material or dict of these by str, optional
+///     The material of all meshes, or of each by its name. Without it `region` says what is made of what. A scene keeps a
+///     `Material` that it is given, whatever a database has; its regions call it `given:NAME`.
 /// name : str, optional
 /// **tables
 ///     Everything else that a scene file has: `seed=7`, `radar={"scan": {...}}`, `spot={"rays": 64}`, `region=[...]`.
@@ -48,16 +51,35 @@ pub(crate) struct Scene {
 /// Where the file of a scene would be that is in no file.
 const NO_FILE: &str = "scene.toml";
 
+/// What the names of meshes and materials begin with that a program gives.
+const GIVEN: &str = "given:";
+
 impl Scene {
     fn of_text(
         text: String,
         path: &Path,
         given: Arc<GivenMeshes>,
+        materials: GivenMaterials,
     ) -> Result<Scene, matdb::error::Error> {
-        let at = |error| scene::SceneError::Format { file: path.to_owned(), error };
-        let file = SceneFile::parse(&text).map_err(at)?;
+        let file = parse(&text, path)?;
         let scene = scene::Scene::resolve_given(file, path, &given)?;
+        let scene = scene::Scene { given: materials, ..scene };
         Ok(Scene { text, path: path.to_owned(), scene, given })
+    }
+
+    /// This scene with another text. Its meshes are loaded only where the text says other things of meshes or regions.
+    fn with_text(
+        &self,
+        py: Python<'_>,
+        text: String,
+        materials: GivenMaterials,
+    ) -> PyResult<Scene> {
+        let made = py.detach(|| -> Result<Scene, matdb::error::Error> {
+            let scene = self.scene.replace(parse(&text, &self.path)?, &self.path, &self.given)?;
+            let scene = scene::Scene { given: materials, ..scene };
+            Ok(Scene { text, path: self.path.clone(), scene, given: self.given.clone() })
+        });
+        made.map_err(raised)
     }
 
     fn table(&self) -> PyResult<Table> {
@@ -79,13 +101,12 @@ impl Scene {
 
     /// This scene with other values: `radar__spot__rays` stands for `rays` under `[radar.spot]`.
     pub(crate) fn with(&self, py: Python<'_>, changes: &Bound<'_, PyDict>) -> PyResult<Scene> {
-        let mut table = self.table()?;
+        let (mut table, mut materials) = (self.table()?, self.scene.given.clone());
         for (key, value) in changes {
             let key: String = key.extract()?;
-            set(&mut table, &key, toml_value(&key, &value)?)?;
+            set(&mut table, &key, toml_value(&key, &value, &mut materials)?)?;
         }
-        let (text, given) = (table.to_string(), self.given.clone());
-        py.detach(|| Scene::of_text(text, &self.path, given)).map_err(raised)
+        self.with_text(py, table.to_string(), materials)
     }
 
     pub(crate) fn name(&self) -> &str {
@@ -95,6 +116,12 @@ impl Scene {
     pub(crate) fn chirps(&self) -> usize {
         self.scene.chirps.rays.len()
     }
+}
+
+/// The file of a scene of its text.
+fn parse(text: &str, path: &Path) -> Result<SceneFile, scene::SceneError> {
+    let at = |error| scene::SceneError::Format { file: path.to_owned(), error };
+    SceneFile::parse(text).map_err(at)
 }
 
 /// A scene as an argument: itself, or its file.
@@ -137,7 +164,7 @@ impl SceneLike {
 ///     A file that is not there, or is no scene.
 #[pyfunction]
 pub(crate) fn load_scene(py: Python<'_>, path: PathBuf) -> PyResult<Scene> {
-    let load = || Scene::of_text(read_text(&path)?, &path, Arc::default());
+    let load = || Scene::of_text(read_text(&path)?, &path, Arc::default(), GivenMaterials::new());
     py.detach(load).map_err(raised::<matdb::error::Error>)
 }
 
@@ -152,10 +179,10 @@ impl Scene {
         name: Option<&str>,
         tables: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Scene> {
-        let mut table = Table::new();
+        let (mut table, mut own) = (Table::new(), GivenMaterials::new());
         for (key, value) in tables.into_iter().flatten() {
             let key: String = key.extract()?;
-            set(&mut table, &key, toml_value(&key, &value)?)?;
+            set(&mut table, &key, toml_value(&key, &value, &mut own)?)?;
         }
         if let Some(name) = name {
             table.insert("name".to_owned(), name.into());
@@ -163,9 +190,9 @@ impl Scene {
         let (mut entries, mut regions, mut given) = (Vec::new(), Vec::new(), GivenMeshes::new());
         for (name, mesh) in meshes {
             let name: String = name.extract()?;
-            entries.push(Value::Table(mesh_entry(&name, &mesh, &mut given)?));
+            entries.push(Value::Table(mesh_entry(&name, &mesh, &mut given, &mut own)?));
             if let Some(materials) = materials {
-                regions.push(Value::Table(region_of(&name, materials)?));
+                regions.push(Value::Table(region_of(&name, materials, &mut own)?));
             }
         }
         table.insert("mesh".to_owned(), entries.into());
@@ -175,13 +202,14 @@ impl Scene {
             ));
         }
         let (text, given) = (table.to_string(), Arc::new(given));
-        py.detach(|| Scene::of_text(text, Path::new(NO_FILE), given)).map_err(raised)
+        py.detach(|| Scene::of_text(text, Path::new(NO_FILE), given, own)).map_err(raised)
     }
 
     /// A scene of a text of a scene file. Relative paths in it start from the folder of `path`.
     #[staticmethod]
     fn from_text(py: Python<'_>, text: String, path: PathBuf) -> PyResult<Scene> {
-        py.detach(|| Scene::of_text(text, &path, Arc::default())).map_err(raised)
+        let made = || Scene::of_text(text, &path, Arc::default(), GivenMaterials::new());
+        py.detach(made).map_err(raised)
     }
 
     /// Its name.
@@ -219,25 +247,53 @@ impl Scene {
         self.with(py, changes.unwrap_or(&PyDict::new(py)))
     }
 
+    /// This scene with other materials of its regions, by their names. Meshes are not loaded again.
+    ///
+    /// Parameters
+    /// ----------
+    /// materials : dict of str to str or Material
+    fn with_materials(&self, py: Python<'_>, materials: &Bound<'_, PyDict>) -> PyResult<Scene> {
+        let (mut table, mut own) = (self.table()?, self.scene.given.clone());
+        for (region, material) in materials {
+            let region: String = region.extract()?;
+            let material = toml_value("material", &material, &mut own)?;
+            let entries = table.get_mut("region").and_then(Value::as_array_mut);
+            let is_it =
+                |entry: &&mut Value| entry.get("name").and_then(Value::as_str) == Some(&region);
+            let Some(entry) = entries.into_iter().flatten().find(is_it) else {
+                return Err(no_choice("region", &region, &self.regions().join(", ")));
+            };
+            entry["material"] = material;
+        }
+        self.with_text(py, table.to_string(), own)
+    }
+
     fn __repr__(&self) -> String {
         let facets = self.scene.target.mesh.facets.len();
         format!("<matdb.Scene {}: {} chirps, {facets} facets>", self.name(), self.chirps())
     }
 
-    /// Writes its file, with the meshes that are in no file beside it as PLY.
+    /// Writes its file, with the meshes that are in no file beside it as PLY, and the materials that it was given as
+    /// `material-NAME.toml`, which `Database.add` takes.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        let mut table = self.table()?;
-        let meshes = table.get_mut("mesh").and_then(Value::as_array_mut);
-        let mut files = Vec::new();
-        for (number, entry) in meshes.into_iter().flatten().enumerate() {
-            let named = entry
-                .get("file")
-                .and_then(Value::as_str)
-                .and_then(|file| file.strip_prefix("given:"));
-            if let Some(mesh) = named.and_then(|name| self.given.get(name)) {
+        let (mut table, mut files) = (self.table()?, Vec::new());
+        for (number, entry) in entries(&mut table, "mesh").enumerate() {
+            let mesh = given(entry, "file").and_then(|name| self.given.get(name));
+            if let Some(mesh) = mesh {
                 let file = format!("mesh-{number}.ply");
                 files.push((file.clone(), write_mesh(mesh)));
                 entry["file"] = file.into();
+            }
+        }
+        for (key, material) in &self.scene.given {
+            let name = &material.slug;
+            let file =
+                file::write(material).map_err(|error| UsageError::new_err(error.to_string()))?;
+            files.push((format!("material-{name}.toml"), file.into_bytes()));
+            for entry in entries(&mut table, "region") {
+                if entry.get("material").and_then(Value::as_str) == Some(key) {
+                    entry["material"] = name.as_str().into();
+                }
             }
         }
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -252,12 +308,14 @@ impl Scene {
         text: String,
         path: PathBuf,
         given: &Bound<'_, PyDict>,
+        materials: &str,
     ) -> PyResult<Scene> {
         let mut meshes = GivenMeshes::new();
         for (name, mesh) in given {
             meshes.insert(name.extract()?, mesh_of(&mesh)?);
         }
-        py.detach(|| Scene::of_text(text, &path, Arc::new(meshes))).map_err(raised)
+        let materials = of_text(materials)?;
+        py.detach(|| Scene::of_text(text, &path, Arc::new(meshes), materials)).map_err(raised)
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
@@ -269,13 +327,28 @@ impl Scene {
             let facets = PyArray1::from_iter(py, mesh.facets.iter().flatten().copied());
             given.set_item(name, (vertices, facets.reshape([mesh.facets.len(), 3])?))?;
         }
-        let parts = (&own.text, &own.path, given);
+        let parts = (&own.text, &own.path, given, text_of(&own.scene.given)?);
         (slf.get_type().getattr("_of_parts")?, parts).into_pyobject(py)
     }
 }
 
+/// The tables of this name.
+fn entries<'a>(table: &'a mut Table, name: &str) -> impl Iterator<Item = &'a mut Value> {
+    table.get_mut(name).and_then(Value::as_array_mut).into_iter().flatten()
+}
+
+/// The name of what a program gave under a key of an entry.
+fn given<'a>(entry: &'a Value, key: &str) -> Option<&'a str> {
+    entry.get(key).and_then(Value::as_str)?.strip_prefix(GIVEN)
+}
+
 /// The entry of a mesh; one that is in no file goes into `given`.
-fn mesh_entry(name: &str, mesh: &Bound<'_, PyAny>, given: &mut GivenMeshes) -> PyResult<Table> {
+fn mesh_entry(
+    name: &str,
+    mesh: &Bound<'_, PyAny>,
+    given: &mut GivenMeshes,
+    materials: &mut GivenMaterials,
+) -> PyResult<Table> {
     let mut entry = Table::new();
     let mut mesh = mesh.clone();
     if let Ok(keys) = mesh.cast::<PyDict>() {
@@ -285,7 +358,7 @@ fn mesh_entry(name: &str, mesh: &Bound<'_, PyAny>, given: &mut GivenMeshes) -> P
         for (key, value) in keys {
             let key: String = key.extract()?;
             if key != "mesh" {
-                entry.insert(key.clone(), toml_value(&key, &value)?);
+                entry.insert(key.clone(), toml_value(&key, &value, materials)?);
             }
         }
         mesh = own;
@@ -297,7 +370,7 @@ fn mesh_entry(name: &str, mesh: &Bound<'_, PyAny>, given: &mut GivenMeshes) -> P
             own.validate()
                 .map_err(|error| UsageError::new_err(format!("meshes[{name:?}]: {error}")))?;
             given.insert(name.to_owned(), own);
-            format!("given:{name}")
+            format!("{GIVEN}{name}")
         }
     };
     entry.insert("name".to_owned(), name.into());
@@ -306,7 +379,11 @@ fn mesh_entry(name: &str, mesh: &Bound<'_, PyAny>, given: &mut GivenMeshes) -> P
 }
 
 /// The region of a mesh.
-fn region_of(mesh: &str, materials: &Bound<'_, PyAny>) -> PyResult<Table> {
+fn region_of(
+    mesh: &str,
+    materials: &Bound<'_, PyAny>,
+    own: &mut GivenMaterials,
+) -> PyResult<Table> {
     let material = if let Ok(materials) = materials.cast::<PyDict>() {
         let material = materials.get_item(mesh)?;
         material.ok_or_else(|| {
@@ -315,10 +392,10 @@ fn region_of(mesh: &str, materials: &Bound<'_, PyAny>) -> PyResult<Table> {
     } else {
         materials.clone()
     };
-    let material: String = material.extract()?;
-    Ok([("name", mesh.to_owned()), ("mesh", mesh.to_owned()), ("material", material)]
+    let material = toml_value("material", &material, own)?;
+    Ok([("name", mesh.into()), ("mesh", mesh.into()), ("material", material)]
         .into_iter()
-        .map(|(key, value)| (key.to_owned(), value.into()))
+        .map(|(key, value)| (key.to_owned(), value))
         .collect())
 }
 
@@ -378,8 +455,22 @@ fn set(table: &mut Table, key: &str, value: Value) -> PyResult<()> {
     }
 }
 
-/// A value of Python as one of TOML.
-fn toml_value(key: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
+/// A value of Python as one of TOML. A material goes into `materials`, and its name there stands for it.
+fn toml_value(
+    key: &str,
+    value: &Bound<'_, PyAny>,
+    materials: &mut GivenMaterials,
+) -> PyResult<Value> {
+    if let Ok(material) = value.cast::<Material>() {
+        let material = &material.get().found().material;
+        let name = format!("{GIVEN}{}", material.slug);
+        if materials.get(&name).is_some_and(|known| known != material) {
+            let problem = format!("two materials of the scene are called {}", material.slug);
+            return Err(UsageError::new_err(format!("{problem}; give one another name")));
+        }
+        materials.insert(name.clone(), material.clone());
+        return Ok(name.into());
+    }
     if value.is_instance_of::<PyBool>() {
         Ok(value.extract::<bool>()?.into())
     } else if value.is_instance_of::<PyInt>() {
@@ -392,7 +483,7 @@ fn toml_value(key: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
         let mut table = Table::new();
         for (name, value) in dict {
             let name: String = name.extract()?;
-            let value = toml_value(&name, &value)?;
+            let value = toml_value(&name, &value, materials)?;
             table.insert(name, value);
         }
         Ok(table.into())
@@ -400,10 +491,10 @@ fn toml_value(key: &str, value: &Bound<'_, PyAny>) -> PyResult<Value> {
         Ok(path.extract::<String>()?.into())
     } else if value.hasattr("tolist")? {
         // Numbers and arrays of numpy.
-        toml_value(key, &value.call_method0("tolist")?)
+        toml_value(key, &value.call_method0("tolist")?, materials)
     } else if let Ok(items) = value.try_iter() {
-        let values: PyResult<Vec<Value>> = items.map(|item| toml_value(key, &item?)).collect();
-        Ok(values?.into())
+        let values = items.map(|item| toml_value(key, &item?, materials));
+        Ok(values.collect::<PyResult<Vec<Value>>>()?.into())
     } else {
         Err(PyTypeError::new_err(format!("a scene has no such value as {key}={value}")))
     }

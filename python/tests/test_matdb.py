@@ -46,6 +46,12 @@ def command(folder, *words):
     return subprocess.run([sys.executable, "-c", COMMAND, *words], cwd=folder, capture_output=True, text=True)
 
 
+def said_by_command(folder, *words):
+    done = command(folder, *words, "--json", "-q")
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
 @pytest.fixture
 def scene(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -276,7 +282,7 @@ def examples():
     root = Path(__file__).parent.parent.parent
     pages = [(root / page).read_text() for page in ["python/README.md", "docs/python.md"]]
     found = [example for page in pages for example in re.findall(r"```python\n(.*?)```", page, re.DOTALL)]
-    assert len(found) == 6
+    assert len(found) == 8
     return found
 
 
@@ -430,9 +436,7 @@ def test_comparing_and_calibrating_are_those_of_the_command_line(tmp_path, monke
     md.render(plate).save("out")
 
     def said(*words):
-        done = command(tmp_path, *words, "--json", "-q")
-        assert done.returncode == 0, done.stderr
-        return json.loads(done.stdout)
+        return said_by_command(tmp_path, *words)
 
     where = ["out/cloud.ply", "--scene", "builtin:calibration-plate"]
     assert md.calibrate("out/cloud.ply", plate) == said("calibrate", *where)
@@ -487,9 +491,7 @@ def test_a_database_says_and_does_what_the_command_line_does(scene, tmp_path):
     db.add("cotton", "ptfe", "steel", "mannequin-paint")
 
     def said(*words):
-        done = command(tmp_path, *words, "--json", "-q")
-        assert done.returncode == 0, done.stderr
-        return json.loads(done.stdout)
+        return said_by_command(tmp_path, *words)
 
     assert db.history("cotton") == said("history", "cotton")
     assert db.diff("cotton", "ptfe") == said("diff", "cotton", "ptfe")
@@ -522,3 +524,422 @@ def test_a_database_says_and_does_what_the_command_line_does(scene, tmp_path):
     done = subprocess.run([sys.executable, "-c", snippet], cwd="site", capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert "cotton@1" in done.stdout and "[" in done.stdout
+
+
+def test_materials_are_chosen_as_by_the_command_line(scene, tmp_path):
+    db = md.open()
+    db.add("cotton", "ptfe", "steel", "mannequin-paint")
+    curve = md.measure(md.render(scene), scene)
+    curve.save("measured")
+    for keywords, flags in [
+        ({"frequency_ghz": 300}, ["--frequency", "300"]),
+        ({"kind": "measured", "fitted": False}, ["--kind", "measured", "--not-fitted"]),
+        ({"material_class": "polymer", "status": "active"}, ["--class", "polymer", "--status", "active"]),
+        ({"fitted": True, "tag": None}, ["--fitted"]),
+        ({"tag": "paint"}, ["--tag", "paint"]),
+    ]:
+        assert db.materials(**keywords) == said_by_command(tmp_path, "list", *flags)
+        assert db.search("a", most=9, **keywords) == said_by_command(tmp_path, "search", "a", "--limit", "9", *flags)
+        assert db.near("cotton", **keywords) == said_by_command(tmp_path, "near", "--material", "cotton", *flags)
+    assert len(db.materials()) == 4 and len(db.materials(most=1)) == 1
+    assert {one["slug"] for one in db.search("a", frequency_ghz=300)} < {one["slug"] for one in db.search("a", most=99)}
+    assert db.search("paint", frequency_ghz=0.001) == []
+    near = said_by_command(tmp_path, "near", "--curve", "measured/curve.csv", "--measured-at", "300")
+    assert db.near(curve="measured/curve.csv", measured_at_ghz=300) == near
+    same = db.near(curve=curve, measured_at_ghz=300)
+    assert [one["slug"] for one in same["materials"]] == [one["slug"] for one in near["materials"]]
+    with pytest.raises(TypeError, match="unexpected keyword .class.; materials are chosen by frequency_ghz, tag"):
+        db.search("paint", **{"class": "paint"})
+    with pytest.raises(md.UsageError, match="status = .new. is not known; give active"):
+        db.materials(status="new")
+    with pytest.raises(md.UsageError, match="-3 GHz is not a frequency"):
+        db.materials(frequency_ghz=-3)
+    with pytest.raises(md.UsageError, match="give a material, or a curve"):
+        db.near("cotton", curve=curve)
+
+
+def test_effects_and_publications_are_those_of_the_command_line(scene, tmp_path):
+    assert md.effects() == said_by_command(tmp_path, "effects")
+    assert md.effects("drift") == said_by_command(tmp_path, "effects", "drift")
+    with pytest.raises(md.UsageError, match="there is no effect `drifts`"):
+        md.effects("drifts")
+    db = md.open()
+    db.add("cotton")
+    db.publish("site")
+    assert md.verify("site") == said_by_command(tmp_path, "verify", "site")
+    Path("site/catalogue.sqlite").write_bytes(b"")
+    assert md.verify("site")["problems"]
+    with pytest.raises(md.CatalogueError):
+        md.verify("nowhere")
+
+
+@pytest.mark.parametrize("keyword, flags", [
+    ({"all_hits": True}, ["--all"]),
+    ({"view": True}, ["--view"]),
+    ({"crop": True}, ["--crop", "auto"]),
+    ({"uncompressed": True}, ["--uncompressed"]),
+    ({"tracer": "brute"}, ["--tracer", "brute"]),
+    ({"beat": True}, ["--beat"]),
+], ids=lambda one: "-".join(one))
+def test_renderings_have_the_options_of_the_command_line(scene, tmp_path, keyword, flags):
+    if "beat" in keyword:
+        scene = scene.replace(radar__receiver={}, radar__speckle={"looks": 1})
+        Path("plate.toml").write_text(scene.text)
+    done = command(tmp_path, "render", "plate.toml", "-o", "by-command", *flags)
+    assert done.returncode == 0, done.stderr
+    md.render(scene, **keyword).save("by-python")
+    assert files("by-python") == files("by-command")
+
+
+def test_options_of_a_rendering_are_checked(scene):
+    with pytest.raises(md.UsageError, match="tracer = .fast. is not known; give pinhole"):
+        md.render(scene, tracer="fast")
+    with pytest.raises(md.UsageError, match="a radar without a receiver has no beat signals"):
+        md.render(scene, beat=True)
+
+
+def test_a_seed_loads_no_mesh_again(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    import trimesh
+
+    trimesh.Trimesh(*plate_of(1.0), process=False).export("plate.ply")
+    Path("plate.toml").write_text(SCENE.replace("builtin:plate", "plate.ply").replace("size_m = [1, 1, 0]\n", ""))
+    scene = md.load_scene("plate.toml")
+    expected = md.render(scene.replace(seed=5)).file("cloud.ply")
+    Path("plate.ply").unlink()
+    assert md.render(scene, seed=5).file("cloud.ply") == expected != md.render(scene).file("cloud.ply")
+    assert scene.replace(radar__speckle={"looks": 2, "form": "independent"}).chirps == 144
+    with pytest.raises(md.SceneError, match="plate.ply"):
+        scene.replace(mesh=[{"name": "plate", "file": "plate.ply", "scale": 2}])
+
+
+@pytest.mark.parametrize("keywords, flags", [
+    ({"pose": (0.002, 0, 0.001, 0, 0.5, 0), "refine": True}, ["--pose", "0.002,0,0.001,0,0.5,0", "--refine"]),
+    ({"pose": [0.001, 0, 0], "keep_pose": True}, ["--pose", "0.001,0,0", "--keep-pose"]),
+    ({"metric": "point-to-plane", "edge_margin_m": 0.03, "exact_mesh": True},
+     ["--metric", "point-to-plane", "--edge-margin", "0.03", "--exact-mesh"]),
+], ids=["refine", "keep", "metric"])
+def test_measurements_have_the_options_of_the_command_line(scene, tmp_path, keywords, flags):
+    md.render(scene).save("out")
+    md.measure("out/cloud.ply", scene, **keywords).save("by-hand")
+    done = command(tmp_path, "measure", "out/cloud.ply", "--scene", "plate.toml", "-o", "by-command", "-q", *flags)
+    assert done.returncode == 0, done.stderr
+    assert files("by-hand") == files("by-command")
+
+
+def test_options_of_a_measurement_are_checked(scene):
+    scan = md.render(scene)
+    for wanted, keywords in [
+        ("leave refine or keep_pose out", {"refine": True, "keep_pose": True}),
+        ("there is no pose to keep", {"pose": "auto", "keep_pose": True}),
+        ("metric = .best. is not known", {"metric": "best"}),
+        ("edge_margin_m = 7 is not a margin", {"edge_margin_m": 7}),
+        ("is not a pose; give", {"pose": [1, 2]}),
+        ("unexpected keyword argument .gauge.", {}),
+    ]:
+        with pytest.raises((md.UsageError, TypeError), match=wanted):
+            measured = md.measure(scan, scene, **keywords)
+            measured.fit(gauge=3)
+    with pytest.raises(TypeError, match="or a pose.json"):
+        md.measure(scan, scene, pose=7.0)
+    with pytest.raises(md.UsageError, match="needs a registration"):
+        md.compare(scan, scene, pose="auto")
+    moved = md.compare(scan, scene, pose=[0, 0, 0.05]).record
+    assert moved != md.compare(scan, scene).record
+
+
+def test_settings_of_a_fit_are_those_of_the_command_line(scene, tmp_path):
+    tls = md.fit("cotton", method="tls", theta_sd_deg=0.5, level_sd_db=2, fit_name="mine")
+    said = said_by_command(tmp_path, "fit", "cotton", "--method", "tls", "--theta-sd-deg", "0.5", "--level-sd-db", "2")
+    assert {key: said[key] for key in tls.to_dict()} == tls.to_dict() and tls.name == "mine"
+    pieces = md.fit("cotton", method="mse", split_deg=10)
+    said = said_by_command(tmp_path, "fit", "cotton", "--method", "mse", "--split-deg", "10")
+    assert {key: said[key] for key in pieces.to_dict()} == pieces.to_dict()
+    Path("theirs.csv").write_text("inc,NRCS\n" + "".join(f"{angle},{-0.3 * angle}\n" for angle in range(0, 60, 2)))
+    renamed = md.fit("theirs.csv", model="lambert", columns={"inc": "theta_deg", "NRCS": "sigma0_db"})
+    assert set(renamed.parameters) == {"albedo"}
+    curve = md.measure(md.render(scene), scene)
+    assert curve.fit("lambert", seed=4).to_dict() == md.fit(curve, model="lambert", seed=4).to_dict()
+    cotton = md.open()["cotton"]
+    assert md.fit(cotton, seed=3).to_dict() == md.fit("cotton", seed=3).to_dict()
+    assert cotton.plot().get_ylabel() == "σ⁰, dB"
+    with pytest.raises(TypeError, match="give a matdb.Measurement, a matdb.Material"):
+        md.fit(7)
+
+
+def test_a_material_of_a_file_has_its_details(scene, tmp_path):
+    Path("theirs.csv").write_text("inc,NRCS\n" + "".join(f"{angle},{-0.3 * angle}\n" for angle in range(0, 60, 2)))
+    details = {"source": "A test", "licence": "CC0-1.0", "kind": "synthetic", "instrument": "None", "frequency_ghz": 300,
+               "threshold_dbm": -77, "material_class": "paint"}
+    db = md.open()
+    with pytest.warns(UserWarning):
+        db.add(files=["theirs.csv"], name="theirs", columns={"inc": "theta_deg", "NRCS": "sigma0_db"}, title="Paint of others",
+               tags=["matt"], authors=["Doe, Jane"], year=2025, curve="spring", model="mixture", **details)
+    theirs = db["theirs"].to_dict()
+    assert theirs["name"] == "Paint of others" and theirs["tags"] == ["matt"] and theirs["curves"][0]["name"] == "spring"
+    assert theirs["sources"][0]["citation"] == {"authors": ["Doe, Jane"], "year": 2025} and theirs["fits"]
+    rendered = theirs["render"]
+    kept = md.fit("theirs", db=db, model="lambert")
+    assert db.add("theirs", kept, keep_render=True) == ["theirs@2"] and db["theirs"].to_dict()["render"] == rendered
+    with pytest.raises(md.UsageError, match="model = .soot. is not known; give blinn-phong"):
+        db.add(files=["theirs.csv"], model="soot", **details)
+
+
+def test_hints_are_python(scene, tmp_path):
+    db = md.open()
+    Path("bare.csv").write_text("theta_deg,sigma0_db\n0,-3\n10,-5\n20,-8\n")
+    with pytest.raises(md.Error) as bare:
+        db.add(files=["bare.csv"], name="bare")
+    assert 'material_class="paint"' in bare.value.hint and "threshold_dbm=-77" in bare.value.hint
+    assert 'source="who measured it, where, when"' in bare.value.hint and "--" not in str(bare.value)
+    Path("cloud.csv").write_text("X,Y,Z,Intensity\n100,1100,0,-3\n")
+    with pytest.raises(md.CloudError) as cloud:
+        md.Cloud.load("cloud.csv")
+    assert 'columns={"' in cloud.value.hint and '": "' in cloud.value.hint and "--" not in str(cloud.value)
+    with pytest.raises(md.StoreError) as missing:
+        md.open("none.sqlite").search("paint")
+    assert "--db" not in str(missing.value) and "`matdb add NAME` makes one" in str(missing.value)
+    with pytest.raises(md.UsageError) as tail:
+        md.fit("cotton", method="tls-tail")
+    assert str(tail.value).endswith("(fixed, method)")
+    with pytest.raises(md.UnknownMaterialError) as unknown:
+        db["zzzzzzzz"]
+    assert "`matdb add --from FILE`" in str(unknown.value), "a command stays one"
+    concealed = md.load_scene("builtin:concealed")
+    notices = md.measure(md.render(concealed), concealed).notices
+    assert any("choose one with region: " in notice for notice in notices)
+
+
+def test_answers_can_be_pickled(scene, tmp_path):
+    def again(one):
+        return pickle.loads(pickle.dumps(one))
+
+    scan = md.render(scene)
+    curve = md.measure(scan, scene)
+    other = again(curve)
+    assert repr(other) == repr(curve) and other.record == curve.record and other.notices == curve.notices
+    assert np.array_equal(other.sigma0_db, curve.sigma0_db, equal_nan=True)
+    curve.save("curve")
+    other.save("other")
+    assert files("curve") == files("other")
+    fit = curve.fit("cook-torrance + blinn-phong")
+    assert other.fit("cook-torrance + blinn-phong").to_dict() == fit.to_dict()
+    back = again(fit)
+    assert back.to_dict() == fit.to_dict() and back.verdict == fit.verdict and back.parameters == fit.parameters
+    assert np.array_equal(back.covariance, fit.covariance) and np.array_equal(back.sigma0_db([10]), fit.sigma0_db([10]))
+    assert back.names == fit.names and np.array_equal(back.levels_db, fit.levels_db, equal_nan=True)
+    details = {"source": "A test, 2026", "licence": "CC0-1.0"}
+    for name, one in [("a.sqlite", fit), ("b.sqlite", back)]:
+        assert md.open(name).add("mine", one, **details) == ["mine@1"]
+    assert md.open("a.sqlite")["mine"].content_hash == md.open("b.sqlite")["mine"].content_hash
+    assert again(md.open("a.sqlite")["mine"]).to_dict() == md.open("b.sqlite")["mine"].to_dict()
+    # A fit of a material's own curve goes back into it.
+    db = md.open("c.sqlite")
+    db.add("cotton")
+    assert db.add("cotton", again(md.fit("cotton", db=db))) == ["cotton@2"]
+    assert again(scan.cloud)["chirp"][3] == scan.cloud["chirp"][3]
+
+
+def test_a_pickled_diagnosis_has_its_report_and_its_files(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    import trimesh
+
+    # A mesh in a file, which after.toml names from every folder.
+    Path("in").mkdir()
+    trimesh.creation.box((0.1, 0.1, 0.1)).export("in/box.ply")
+    box = '\n[[mesh]]\nname = "box"\nfile = "box.ply"\ntranslation_m = [3, 0, -3]\n'
+    Path("in/bench.toml").write_text(md.load_scene("builtin:bench").text + box)
+    cloud = md.render(md.load_scene("builtin:concealed"))
+    scene = md.load_scene("in/bench.toml")
+    why = md.diagnose(cloud, scene, effects=["foreign-patch"], controls=False)
+    back = pickle.loads(pickle.dumps(why))
+    assert repr(back) == repr(why) and back.to_dict() == why.to_dict() and back.before == why.before
+    why.save("why")
+    # Elsewhere, as in another process.
+    Path("elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    back.save("why")
+    back.report("page.html")
+    assert files("why").keys() == files("../why").keys()
+    assert all(files("why")[name] == files("../why")[name] for name in files("why") if name != "after.toml")
+    assert md.load_scene("why/after.toml").chirps == scene.chirps
+    with pytest.raises(md.Error, match="no diagnosis wrote it"):
+        Path("mine").mkdir()
+        Path("mine/after.toml").write_text("name = 'mine'\n")
+        back.save("mine")
+
+
+def test_tables_go_out_by_arrow(scene):
+    import pandas as pd
+    import polars as pl
+    import pyarrow as pa
+
+    scan = md.render(scene)
+    points = md.Cloud(scan.xyz_m, scan.points_dbm, chirp=np.where(scan.points_dbm > -60, 3, np.nan))
+    curve = md.measure(scan, scene)
+    for table, names in [
+        (scan.cloud, ["x_m", "y_m", "z_m", "power_dbm", "chirp", "incidence_deg"]),
+        (points, ["x_m", "y_m", "z_m", "power_dbm", "chirp", "range_m"]),
+        (curve, ["theta_deg", "sigma0_db", "threshold_db", "power_dbm", "chirp"]),
+    ]:
+        arrow, polars, pandas = pa.table(table), pl.DataFrame(table), pd.DataFrame.from_arrow(table)
+        arrow.validate(full=True)
+        assert arrow.equals(table.to_arrow())
+        rows = len(table.get("x_m")) if isinstance(table, md.Table) else len(table)
+        assert arrow.num_rows == len(polars) == len(pandas) == rows
+        assert set(names) <= set(arrow.column_names) and arrow.column_names == polars.columns == list(pandas.columns)
+        assert polars.equals(pl.from_arrow(arrow)) and pandas.equals(pd.DataFrame.from_arrow(arrow))
+    assert pa.table(scan.cloud)["x_m"].to_numpy().tolist() == scan.cloud["x_m"].tolist() == scan.xyz_m[:, 0].tolist()
+    assert pa.table(scan.cloud)["power_dbm"].type == pa.float32() and pa.table(scan.cloud)["chirp"].type == pa.int32()
+    # What is not there is null.
+    chirps = pa.table(points)["chirp"]
+    assert chirps.type == pa.uint32() and chirps.null_count == np.isnan(points.chirp).sum()
+    assert [one is None for one in chirps.to_pylist()] == np.isnan(points.chirp).tolist()
+    assert pa.table(points)["range_m"].null_count == len(points)
+    levels = pa.table(curve)["sigma0_db"]
+    assert levels.null_count == np.isnan(curve.sigma0_db).sum() > 0
+    assert np.array_equal(levels.to_numpy(), curve.sigma0_db, equal_nan=True)
+    # And back again.
+    pl.DataFrame(points).write_csv("points.csv")
+    assert np.allclose(md.Cloud.load("points.csv").xyz_m, points.xyz_m)
+    pl.DataFrame(curve).drop("theta_sd_deg").write_csv("curve.csv")
+    # A capsule that nobody reads, and a stream that outlives its table.
+    del table
+    capsule = scan.cloud.__arrow_c_stream__()
+    del capsule
+    reader = pa.RecordBatchReader.from_stream(md.Cloud([[0, 0, 1]], [-40]))
+    assert reader.schema.names[0] == "x_m" and reader.read_all().num_rows == 1
+    half = pa.RecordBatchReader.from_stream(curve)
+    half.read_next_batch().column(0)
+    del half
+
+
+def test_a_table_is_a_mapping_of_arrays(scene):
+    from collections.abc import Mapping
+
+    scan = md.render(scene)
+    table = scan.cloud
+    assert isinstance(table, Mapping) and isinstance(table, md.Table)
+    assert list(table) == table.keys() and "x_m" in table and "x" not in table and len(table) == len(table.keys())
+    assert dict(table)["chirp"] is table["chirp"] and table.get("x") is None and table.get("x", 7) == 7
+    assert dict(table.items()).keys() == dict(**table).keys() and len(table.values()) == len(table)
+    assert repr(table).startswith(f"<matdb.Table of {len(scan.points_dbm)} rows: x_m, y_m")
+    with pytest.raises(KeyError):
+        table["x"]
+    with pytest.raises(ValueError):
+        table["x_m"][0] = 1.0
+
+
+def test_memory_of_tables_does_not_grow(scene):
+    import pyarrow as pa
+
+    def kilobytes():
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+    points = md.Cloud(np.tile(md.render(scene).xyz_m, (300, 1)), np.tile(md.render(scene).points_dbm, 300))
+    for _ in range(20):
+        pa.table(points)
+    before = kilobytes()
+    for _ in range(200):
+        pa.table(points)
+    assert kilobytes() - before < 16_000, "200 tables of 1.7 MB each"
+
+
+def test_a_function_is_a_material(scene):
+    def lobe(theta_deg):
+        return 10 * np.log10(np.exp(-((theta_deg / 6) ** 2)) + 0.003 * np.cos(np.radians(theta_deg)) ** 2)
+
+    law = md.Material("my-lobe", lobe)
+    assert repr(law) == "<matdb.Material my-lobe, of a function>" and law.kind == "synthetic"
+    assert law.sampling_error_db <= 0.01 and md.open()["cotton"].sampling_error_db is None
+    angles = np.linspace(0, 88.9, 777)
+    assert np.abs(law.sigma0_db(angles) - lobe(angles)).max() < 0.02
+    own = scene.with_materials({"all": law})
+    scan = md.render(own)
+    # A curve of a file with the same levels renders the same.
+    assert scan.record["materials"][0]["name"] == "given:my-lobe"
+    again = pickle.loads(pickle.dumps(own))
+    assert md.render(again).file("cloud.ply") == scan.file("cloud.ply") != md.render(scene).file("cloud.ply")
+    assert np.array_equal(pickle.loads(pickle.dumps(law)).sigma0_db(angles), law.sigma0_db(angles))
+    curve = md.measure(md.render(own.replace(radar__speckle={"looks": 64, "form": "independent"})), own)
+    seen = np.isfinite(curve.sigma0_db)
+    assert np.abs(np.mean(curve.sigma0_db[seen] - lobe(curve.theta_deg[seen]))) < 0.5
+    assert md.fit(law, model="mixture-ggx", method="mse").parameters
+    arrays = md.Scene(meshes={"plate": {"mesh": plate_of(1.0), "translation_m": [0, 1.1, 0]}}, materials={"plate": law},
+                      radar=scene.to_dict()["radar"], seed=1)
+    assert np.allclose(md.render(arrays).points_dbm, scan.points_dbm, atol=1e-3)
+    assert abs(np.nanmean(md.compare(scan, own).simulated_dbm) - np.nanmean(scan.power_dbm)) < 3
+    # Saved with its material, which a database takes.
+    own.save("kept/scene.toml")
+    db = md.open("kept.sqlite")
+    with pytest.warns(UserWarning):
+        db.add(files=["kept/material-my-lobe.toml"])
+    kept = md.render(md.load_scene("kept/scene.toml"), db=db)
+    assert np.allclose(kept.points_dbm, scan.points_dbm, atol=1e-3)
+    # A material of a database is kept, too, whatever that has later.
+    cotton = db["cotton"]
+    assert md.render(scene.with_materials({"all": cotton})).file("power.png") == md.render(
+        scene.with_materials({"all": "cotton"})).file("power.png")
+    with pytest.raises(md.UsageError, match="region = .sleeve. is not known; give all"):
+        scene.with_materials({"sleeve": law})
+    with pytest.raises(md.UsageError, match="two materials of the scene are called my-lobe"):
+        own.with_materials({"all": md.Material("my-lobe", lambda theta_deg: -10)})
+
+
+def test_a_function_that_is_no_curve_is_said_so():
+    with pytest.warns(UserWarning, match=r"step: .* off the function, at (29|30)\."):
+        step = md.Material("step", lambda theta_deg: np.where(theta_deg < 30, 0, -10))
+    assert step.sampling_error_db > 1
+    silent = md.Material("silent", lambda theta_deg: np.where(theta_deg < 40, -3.0, -np.inf))
+    assert silent.sigma0_db([50])[0] == -np.inf and abs(silent.sigma0_db([30])[0] + 3) < 1e-9
+    with pytest.raises(md.UsageError, match="is not a material name"):
+        md.Material("My Paint", lambda theta_deg: -10)
+    with pytest.raises(md.MaterialError, match="gives inf dB at 0.0000°"):
+        md.Material("loud", lambda theta_deg: np.inf)
+    with pytest.raises(ZeroDivisionError):
+        md.Material("broken", lambda theta_deg: 1 / 0)
+    with pytest.raises(ValueError):
+        md.Material("short", lambda theta_deg: theta_deg[:3])
+
+
+def test_a_function_is_a_base_model_of_a_diagnosis():
+    bench = md.load_scene("builtin:bench")
+    name = bench.to_dict()["region"][0]["material"]
+    known = md.open()[name]
+    law = md.Material("mine", lambda theta_deg: known.sigma0_db(theta_deg))
+    own = bench.with_materials({region: law for region in bench.regions})
+    why = md.diagnose(md.render(md.load_scene("builtin:concealed")), own, effects=["foreign-patch", "drift"], controls=False)
+    assert [effect["name"] for effect in why.effects] == ["foreign-patch"]
+
+
+def test_what_is_missing_is_said(scene, monkeypatch):
+    scan = md.render(scene)
+    for package, call in [("open3d", scan.to_open3d), ("rerun", scan.to_rerun), ("pyarrow", scan.cloud.to_arrow)]:
+        with monkeypatch.context() as there:
+            there.setitem(sys.modules, package, None)
+            with pytest.raises(ModuleNotFoundError, match="this needs .*; pip install"):
+                call()
+
+
+def test_a_scan_is_a_cloud_of_open3d(scene):
+    pytest.importorskip("open3d", reason="open3d is not installed", exc_type=ImportError)
+    scan = md.render(scene)
+    cloud = scan.to_open3d()
+    assert np.array_equal(cloud.point["positions"].numpy(), scan.xyz_m)
+    assert np.array_equal(cloud.point["power_dbm"].numpy()[:, 0], scan.points_dbm)
+    assert cloud.point["chirp"].numpy()[2, 0] == scan.cloud["chirp"][2]
+    assert cloud.to_legacy().has_colors()
+    # And back.
+    assert len(md.Cloud(cloud.point["positions"].numpy(), cloud.point["power_dbm"].numpy()[:, 0])) == len(scan.points_dbm)
+
+
+def test_a_scan_is_logged_to_rerun(scene):
+    rr = pytest.importorskip("rerun", reason="rerun is not installed", exc_type=ImportError)
+    scan = md.render(scene)
+    with pytest.raises(RuntimeError, match="call rerun.init"):
+        scan.to_rerun()
+    rr.init("test")
+    rr.save("scan.rrd")
+    scan.to_rerun("plate")
+    rr.disconnect()
+    assert Path("scan.rrd").stat().st_size > 1000

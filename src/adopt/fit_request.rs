@@ -1,7 +1,7 @@
 //! A fit as a user asks for it, checked before it runs.
 
 use super::admission;
-use super::fit_storage::{FitStorage, StoredFit};
+use super::fit_storage::{FitStorage, NewFit, StoredFit};
 use super::fit_subject::FitSubject;
 use crate::brdf::Brdf;
 use crate::error::Error;
@@ -9,7 +9,6 @@ use crate::fit::coordinates::frequencies;
 use crate::fit::{Fit, FitResult, Method, model, model_names};
 use crate::formats::ColumnNames;
 use crate::formats::text::nearest;
-use crate::material;
 use crate::radar::speckle::standard_deviation_db;
 use crate::setup::{Database, find_material};
 use crate::store::Store;
@@ -89,7 +88,7 @@ pub struct FitOutcome {
     /// The result.
     pub result: FitResult,
     /// The same as a material keeps it.
-    pub fit: material::Fit,
+    pub fit: NewFit,
     /// Where it was stored, if it was.
     pub stored: Option<StoredFit>,
     /// Why the result is not what was asked for: it did not converge, or it could not be stored.
@@ -272,7 +271,8 @@ impl CheckedFit {
             refusal = Some(Error::NotConverged { curve, stop });
         } else if is_possible {
             result.held_out = result.hold_out(&subject.curve);
-            let saved = storage.map(|storage| storage.save(&subject, &fit_name, &result, database));
+            let fit = NewFit::new(&result, &fit_name, &subject.curve_name);
+            let saved = storage.map(|storage| storage.save(&subject, &fit, database));
             match saved.transpose() {
                 Ok(saved) => stored = saved,
                 Err(error) => refusal = Some(error),
@@ -280,7 +280,7 @@ impl CheckedFit {
         } else if storage.is_some() {
             refusal = Some(out_of_range(&subject));
         }
-        let fit = result.stored(&fit_name, &subject.curve_name, "");
+        let fit = NewFit::new(&result, &fit_name, &subject.curve_name);
         Ok(FitOutcome { subject, result, fit, stored, refusal })
     }
 }

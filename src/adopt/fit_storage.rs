@@ -1,6 +1,6 @@
 //! A fit into a material, as a new revision.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::curve::{AddedCurve, CurveOrigin, add_curve};
 use super::fit_subject::FitSubject;
@@ -8,7 +8,7 @@ use super::provenance::{activity, add_source};
 use super::recipients::replace_fit;
 use crate::error::Error;
 use crate::fit::{Finding, FitResult};
-use crate::material::{Curve, FitReport, Material, SourceKind};
+use crate::material::{Curve, Fit, FitReport, Material, SourceKind};
 use crate::setup::{Database, MaterialRevision, find_material};
 use crate::store::Store;
 
@@ -43,10 +43,61 @@ pub struct StoredFit {
 }
 
 /// The material that gets a fit, with its curve and the key of the curve's source.
-struct Target {
-    material: Material,
-    curve: String,
-    source: String,
+pub(super) struct Target {
+    pub material: Material,
+    pub curve: String,
+    pub source: String,
+}
+
+/// A fit that no material has yet.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct NewFit {
+    /// The fit. Curve and source are those of the material that gets it.
+    pub fit: Fit,
+    /// Whether it leaves its curve open somewhere, so that it is not rendered.
+    pub leaves_curve_open: bool,
+}
+
+impl NewFit {
+    /// A fit of the curve of this name.
+    pub fn new(found: &FitResult, name: &str, curve: &str) -> NewFit {
+        let leaves_curve_open = found.verdict.iter().any(Finding::leaves_the_curve_open);
+        NewFit { fit: found.stored(name, curve, ""), leaves_curve_open }
+    }
+
+    /// Adds the fit to a material, which renders it from now on, unless it keeps what it renders or the fit leaves the curve
+    /// open.
+    pub(super) fn add_to(&self, target: &mut Target, keep_render: bool) {
+        let Target { material, curve, source } = target;
+        let parameter_sources = add_parameter_sources(material, &self.fit);
+        let (curve, source) = (Some(curve.clone()), source.clone());
+        replace_fit(material, Fit { curve, source, parameter_sources, ..self.fit.clone() });
+        if !keep_render && !self.leaves_curve_open {
+            material.render.clone_from(&self.fit.name);
+        }
+    }
+
+    /// Stores the material that has got the fit.
+    pub(super) fn store(
+        &self,
+        target: Target,
+        subject: &FitSubject,
+        mut store: Store,
+        database: &Database,
+    ) -> Result<StoredFit, Error> {
+        let files: Vec<_> = subject.file.as_deref().into_iter().collect();
+        store.record(activity("fit", &files)?);
+        let added = store.add([&target.material])?;
+        Ok(StoredFit {
+            material: target.material.slug.to_string(),
+            revision: added.first().map_or(1, |added| added.revision()),
+            fit: self.fit.name.clone(),
+            curve: target.curve,
+            render: target.material.render,
+            curve_is_open: self.leaves_curve_open,
+            database: database.path().display().to_string(),
+        })
+    }
 }
 
 impl FitStorage {
@@ -72,27 +123,13 @@ impl FitStorage {
     pub(super) fn save(
         &self,
         subject: &FitSubject,
-        fit_name: &str,
-        found: &FitResult,
+        fit: &NewFit,
         database: &Database,
     ) -> Result<StoredFit, Error> {
-        let mut store = database.write()?;
-        let files: Vec<_> = subject.file.as_deref().into_iter().collect();
-        store.record(activity("fit", &files)?);
-        let Target { mut material, curve, source } =
-            self.target(subject, fit_name, Some(&store))?;
-        let names = [&*curve, &*source];
-        let is_open = render_fit(&mut material, found, fit_name, names, self.keep_render);
-        let added = store.add([&material])?;
-        Ok(StoredFit {
-            material: material.slug.to_string(),
-            revision: added.first().map_or(1, |added| added.revision()),
-            fit: fit_name.to_owned(),
-            curve,
-            render: material.render,
-            curve_is_open: is_open,
-            database: database.path().display().to_string(),
-        })
+        let store = database.write()?;
+        let mut target = self.target(subject, &fit.fit.name, Some(&store))?;
+        fit.add_to(&mut target, self.keep_render);
+        fit.store(target, subject, store, database)
     }
 
     fn target(
@@ -176,38 +213,23 @@ impl FitStorage {
     }
 }
 
-/// Adds a fit of a curve with this name and source to a material, which renders it from now on, unless it keeps what it
-/// renders or the fit leaves the curve open; whether it does.
-pub(super) fn render_fit(
-    material: &mut Material,
-    found: &FitResult,
-    fit_name: &str,
-    [curve, source]: [&str; 2],
-    keep_render: bool,
-) -> bool {
-    let mut fit = found.stored(fit_name, curve, source);
-    fit.parameter_sources = add_parameter_sources(material, found);
-    replace_fit(material, fit);
-    let is_open = found.verdict.iter().any(Finding::leaves_the_curve_open);
-    if !keep_render && !is_open {
-        fit_name.clone_into(&mut material.render);
-    }
-    is_open
-}
-
 fn curve_of<'a>(material: &'a Material, name: &str) -> Option<&'a Curve> {
     material.curves.iter().find(|curve| curve.name == name)
 }
 
 /// Adds the sources of the parameters that no data gave: those that were fixed, and those that are a convention.
 /// Path and key of each.
-fn add_parameter_sources(material: &mut Material, found: &FitResult) -> Vec<(String, String)> {
+fn add_parameter_sources(material: &mut Material, fit: &Fit) -> Vec<(String, String)> {
     const CHOSEN: &str = "Chosen, while the other parameters were fitted";
     const CONVENTION: &str = "Convention: k is chosen, and f_lambda and r_s follow from it; the curve tells \
                               S = (1 − k)·f_lambda and R = k·r_s";
-    let fixed: Vec<String> = found.fit.fixed.iter().map(|(path, _)| path.clone()).collect();
+    let Some(report) = &fit.report else { return Vec::new() };
+    let paths: Vec<String> = fit.model.parameters().into_iter().map(|one| one.path).collect();
+    // Settings of the fit are given, too.
+    let given = report.given.iter().map(|number| number.name.clone());
+    let fixed: Vec<String> = given.filter(|name| paths.contains(name)).collect();
     let mut by_convention = Vec::new();
-    if found.gauge_k.is_some() {
+    if report.gauge.is_some() {
         by_convention.extend(FitReport::BY_CONVENTION.map(str::to_owned));
         by_convention.retain(|path| !fixed.contains(path));
     }

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use serde::{Deserialize, Serialize};
+
 use crate::brdf::Brdf;
 use crate::error::Error;
 use crate::files::{FilesError, WayOut, read_small};
@@ -12,7 +14,7 @@ use crate::setup::{MaterialRevision, find_material};
 use crate::store::Store;
 
 /// A curve and where it comes from.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct FitSubject {
     /// The file or the material, as it was named.
     pub wanted: String,
@@ -88,7 +90,11 @@ impl FitSubject {
         })
     }
 
-    fn of_material(
+    /// The longest curve of a material, or the one of this name; `wanted` is how the material was named.
+    ///
+    /// # Errors
+    /// A material without such a curve.
+    pub fn of_material(
         wanted: &str,
         curve: Option<&str>,
         found: MaterialRevision,

@@ -4,12 +4,10 @@ use std::path::Path;
 
 use super::admission;
 use super::fit_request::out_of_range;
-use super::fit_storage::{FitStorage, StoredFit, render_fit};
+use super::fit_storage::{FitStorage, NewFit, StoredFit, Target};
 use super::fit_subject::FitSubject;
-use super::provenance::activity;
 use crate::catalogue::exchange::{Details, Foreign};
 use crate::error::Error;
-use crate::fit::FitResult;
 use crate::setup::{Database, find_material};
 use crate::store::Store;
 
@@ -20,10 +18,8 @@ const USUAL_CLASS: &str = "sample";
 pub struct FittedMaterial<'a> {
     /// What was fitted.
     pub subject: &'a FitSubject,
-    /// The fit.
-    pub result: &'a FitResult,
-    /// Name of the fit.
-    pub fit_name: &'a str,
+    /// The fit, which has converged.
+    pub fit: &'a NewFit,
     /// What a new material states, with its name.
     pub details: Details,
     /// How a material that is there gets it.
@@ -34,15 +30,11 @@ impl FittedMaterial<'_> {
     /// Stores the fit as a new revision of the material, or makes the material with curve and fit.
     ///
     /// # Errors
-    /// Details that a new material lacks; what [`FitStorage`] refuses of one that is there; a fit that did not converge
-    /// or is out of range; a database that cannot be written.
+    /// Details that a new material lacks; what [`FitStorage`] refuses of one that is there; a fit that is out of range; a
+    /// database that cannot be written.
     pub fn store(self, database: &Database) -> Result<StoredFit, Error> {
-        let FittedMaterial { subject, result, fit_name, details, storage } = self;
-        if !result.converged {
-            let curve = subject.label.clone();
-            return Err(Error::NotConverged { curve, stop: result.stop.as_str() });
-        }
-        if result.model.validate().is_err() {
+        let FittedMaterial { subject, fit, details, storage } = self;
+        if fit.fit.model.validate().is_err() {
             return Err(out_of_range(subject));
         }
         let name = details.slug.as_ref().map(ToString::to_string).unwrap_or_default();
@@ -59,7 +51,7 @@ impl FittedMaterial<'_> {
                     "leave them out, or give another name",
                 ));
             }
-            return storage.save(subject, fit_name, result, database);
+            return storage.save(subject, fit, database);
         }
         let class = details.class.or_else(|| Some(USUAL_CLASS.to_owned()));
         let details = Details { curve: Some(subject.curve_name.clone()), class, ..details };
@@ -71,20 +63,9 @@ impl FittedMaterial<'_> {
         // The text of a file is rounded: keep the very points that were fitted.
         curve.observations.clone_from(&subject.curve.observations);
         let (curve, source) = (curve.name.clone(), curve.source.clone());
-        let is_open = render_fit(&mut material, result, fit_name, [&curve, &source], false);
-        admission::check(&material, Path::new(&subject.label))?;
-        let mut store = database.write()?;
-        let files: Vec<_> = subject.file.as_deref().into_iter().collect();
-        store.record(activity("fit", &files)?);
-        let added = store.add([&material])?;
-        Ok(StoredFit {
-            material: name,
-            revision: added.first().map_or(1, |added| added.revision()),
-            fit: fit_name.to_owned(),
-            curve,
-            render: material.render,
-            curve_is_open: is_open,
-            database: database.path().display().to_string(),
-        })
+        let mut target = Target { material, curve, source };
+        fit.add_to(&mut target, false);
+        admission::check(&target.material, Path::new(&subject.label))?;
+        fit.store(target, subject, database.write()?, database)
     }
 }

@@ -27,7 +27,7 @@ pub use curve::{AddedCurve, CurveOrigin, add_curve, check_frequency_and_threshol
 pub use database_check::{CheckProgress, CheckReport, DatabaseCheck};
 pub use earlier::{Earlier, check_folder};
 pub use fit_request::{CheckedFit, FitMethod, FitOutcome, FitRequest};
-pub use fit_storage::{FitStorage, StoredFit};
+pub use fit_storage::{FitStorage, NewFit, StoredFit};
 pub use fit_subject::FitSubject;
 pub use fitted_material::FittedMaterial;
 pub use material_files::{AddedMaterial, NewMaterials, foreign_format};
@@ -39,5 +39,7 @@ pub use recipients::{
 };
 pub use removal::{Removal, remove_materials};
 pub use request::{CheckedRequest, CloudRequest, as_answer};
-pub use scene_after::{AFTER, MARK, check_beside, name_beside, relocate_files, scene_with_found};
+pub use scene_after::{
+    AFTER, MARK, check_beside, moved_scene, name_beside, relocate_files, scene_with_found,
+};
 pub use withdrawal::Withdrawal;

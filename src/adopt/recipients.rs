@@ -263,7 +263,7 @@ pub(super) fn replace_fit(material: &mut Material, fit: Fit) {
 
 /// The name of a material that is made from the one of this name.
 fn slug_of_copy(name: &str) -> Result<Slug, Error> {
-    let name = name.replace('@', "-");
+    let name = name.replace(['@', ':'], "-");
     let slug = format!("{name:.54}-{FIT}").parse();
     slug.map_err(|problem| Error::Usage { problem, way_out: "rename the material".to_owned() })
 }

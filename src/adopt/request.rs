@@ -298,20 +298,27 @@ impl CheckedRequest<'_> {
     /// # Errors
     /// The file that would be replaced.
     pub fn check_output(&self) -> Result<(), Error> {
-        let CheckedRequest { request, ready, further, .. } = self;
-        let mut written = Vec::new();
-        for material in &ready.materials {
+        let mut written = vec![AFTER.to_owned()];
+        for material in &self.ready.materials {
             written.push(material_file(&material.name));
         }
-        written.push(AFTER.to_owned());
-        let mut named = named_files(&ready.scene, request.scene);
-        for (number, other) in further.iter().enumerate() {
+        for number in 0..self.further.len() {
             written.push(after_of(number + 1));
-            named.extend(named_files(&other.ready.scene, &other.path));
         }
-        let mut read = request.inputs();
-        read.extend(named.iter().map(PathBuf::as_path));
-        check_folder(request.folder, &read, &written)
+        let read = self.files_read();
+        let read: Vec<&Path> = read.iter().map(PathBuf::as_path).collect();
+        check_folder(self.request.folder, &read, &written)
+    }
+
+    /// The files that it is made of: clouds, scenes, and what these name.
+    pub fn files_read(&self) -> Vec<PathBuf> {
+        let mut read: Vec<PathBuf> =
+            self.request.inputs().into_iter().map(Path::to_owned).collect();
+        read.extend(named_files(&self.ready.scene, self.request.scene));
+        for other in &self.further {
+            read.extend(named_files(&other.ready.scene, &other.path));
+        }
+        read
     }
 
     /// Sentences on the scene and its materials that the report repeats.
@@ -419,7 +426,7 @@ pub fn as_answer(error: Error) -> Result<DiagnoseError, Error> {
 
 /// Name of the file of a material that a scene names so.
 pub(super) fn material_file(name: &str) -> String {
-    format!("material-{}.toml", name.replace('@', "-"))
+    format!("material-{}.toml", name.replace(['@', ':'], "-"))
 }
 
 /// Files that a scene names: meshes and a scan.

@@ -88,6 +88,19 @@ pub fn relocate_files(
     Ok(file)
 }
 
+/// The bytes of a scene file with the paths of its meshes and of its scan as seen from `folder`, where they were as seen from
+/// `from`; with the comment that it begins with.
+///
+/// # Errors
+/// Bytes that are no scene, and as [`relocate_files`].
+pub fn moved_scene(bytes: &[u8], from: &Path, folder: &Path) -> Result<Vec<u8>, Error> {
+    let text = String::from_utf8_lossy(bytes);
+    let head: String =
+        text.split_inclusive('\n').take_while(|line| line.starts_with('#')).collect();
+    let file = relocate_files(SceneFile::parse(&text)?, &from.join(AFTER), folder)?;
+    Ok((head + &file.write(&text)?).into_bytes())
+}
+
 /// A path as a scene file can hold it.
 fn utf8(path: PathBuf) -> Result<String, Error> {
     path.into_os_string().into_string().map_err(|path| {
@@ -121,7 +134,8 @@ pub fn check_beside(scene: &Path) -> Result<(), Error> {
 
 /// A folder without links and detours, whether or not it is there yet.
 fn real(folder: &Path) -> Result<PathBuf, Error> {
-    let real = std::path::absolute(folder).and_then(|whole| {
+    // The working directory has an empty name.
+    let real = std::path::absolute(Path::new(".").join(folder)).and_then(|whole| {
         let there = whole.ancestors().find(|path| path.exists()).unwrap_or(&whole);
         let rest = whole.strip_prefix(there).unwrap_or(Path::new(""));
         Ok(there.canonicalize()?.join(rest))

@@ -2,15 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use glam::DVec3;
-
 use crate::error::Error;
 use crate::formats::ColumnNames;
 use crate::frames::{Global, Point, Pose};
 use crate::measure::{Cloud, CloudReading, PowerUnit, Start};
 use crate::radar::Radar;
 use crate::report::shell_word;
-use crate::setup::{absolute, read_cloud, read_pose};
+use crate::setup::{absolute, pose_of_numbers, read_cloud, read_pose};
 
 /// A cloud file and what it does not say of itself.
 #[derive(Debug, clap::Args)]
@@ -165,20 +163,10 @@ pub(super) fn place(text: &str) -> Result<Point<Global>, String> {
 
 fn pose_numbers(text: &str) -> Result<Pose<Global, Global>, Error> {
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
-    let numbers = numbers.unwrap_or_default();
-    if numbers.iter().all(|x: &f64| x.is_finite() && x.abs() <= 1e4) {
-        let turn_and_shift = match numbers[..] {
-            [x, y, z] => Some((DVec3::ZERO, DVec3::new(x, y, z))),
-            [x, y, z, rx, ry, rz] => Some((DVec3::new(rx, ry, rz), DVec3::new(x, y, z))),
-            _ => None,
-        };
-        if let Some((turn_deg, shift_m)) = turn_and_shift {
-            let turn_rad = turn_deg * (std::f64::consts::PI / 180.0);
-            return Ok(Pose::from_euler_xyz(turn_rad, shift_m));
-        }
-    }
-    Err(Error::usage(
-        format!("`{text}` is not a pose"),
-        "write --pose X,Y,Z or X,Y,Z,RX,RY,RZ (m, degrees), `auto`, or a pose.json",
-    ))
+    pose_of_numbers(&numbers.unwrap_or_default()).ok_or_else(|| {
+        Error::usage(
+            format!("`{text}` is not a pose"),
+            "write --pose X,Y,Z or X,Y,Z,RX,RY,RZ (m, degrees), `auto`, or a pose.json",
+        )
+    })
 }

@@ -3,13 +3,13 @@
 //! A permittivity is relative and written ε = ε′ − jε″ for fields that go as exp(+jωt): a passive
 //! material has ε″ ≥ 0.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::error::{MaterialError, value};
 use super::number_check::NumberCheck;
 
 /// One layer of a material; they are listed from the outermost inwards.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Layer {
     /// What it is.
     pub name: String,
@@ -25,7 +25,7 @@ pub struct Layer {
 /// The permittivity of a substance at one frequency and temperature.
 ///
 /// A key may stand at several frequencies and temperatures, once at each.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Permittivity {
     /// The substance, by which layers name it.
     pub key: String,
@@ -49,7 +49,7 @@ pub struct Permittivity {
 }
 
 /// How rough the outer surface is.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Roughness {
     /// Root mean square of heights, m, 0 or more.
     pub rms_height_m: f64,

@@ -9,7 +9,7 @@ use crate::formats::words::significant;
 use crate::radar::Footprint;
 
 /// A scattering curve: observations in the order of the file.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Curve {
     /// Name, unique among the material's curves and fits.
     pub name: String,
@@ -118,7 +118,7 @@ impl Illumination {
 }
 
 /// One point of a curve. In backscatter θ_r = θ_i and Δφ = 0.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Observation {
     /// Angle of incidence, rad.
     pub theta_i_rad: f64,

@@ -7,7 +7,7 @@ use super::report::{Estimate, FitReport};
 use crate::brdf::{Brdf, Parameter, ScatteringModel};
 
 /// A scattering model with numbers in it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fit {
     /// Name, unique among the material's curves and fits.
     pub name: String,
@@ -18,7 +18,7 @@ pub struct Fit {
     /// The curve that was fitted, if one was.
     pub curve: Option<String>,
     /// Whose lobes the model has.
-    #[serde(skip_serializing_if = "Lobes::is_of_both")]
+    #[serde(default, skip_serializing_if = "Lobes::is_of_both")]
     pub lobes: Lobes,
     /// Key of the source of every parameter that has none of its own.
     pub source: String,

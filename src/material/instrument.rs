@@ -6,7 +6,7 @@ use super::error::{MaterialError, value};
 use super::number_check::NumberCheck;
 
 /// What a curve was measured with. A number that is not known is `None`.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Instrument {
     /// Key within the material.
     pub key: String,

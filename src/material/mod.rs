@@ -20,6 +20,7 @@ mod provenance;
 mod reach;
 mod report;
 mod revision;
+mod sampled;
 mod slug;
 mod status;
 mod texts;
@@ -39,6 +40,7 @@ pub use provenance::{
 pub use reach::Reach;
 pub use report::{CrossValidation, Estimate, FitReport, FixedNumber, Goodness};
 pub use revision::Material;
+pub use sampled::SampledMaterial;
 pub use slug::Slug;
 pub use status::Status;
 pub use texts::LONGEST_TEXT_BYTES;

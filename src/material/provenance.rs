@@ -8,7 +8,7 @@ use super::form::{is_date, is_hash};
 use super::number_check::{NumberCheck, is_number};
 
 /// Where numbers come from.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Source {
     /// Key within the material.
     pub key: String,
@@ -25,7 +25,7 @@ pub struct Source {
     /// What was taken and how it was turned into our numbers.
     pub note: Option<String>,
     /// What a list of references needs beyond the title.
-    #[serde(skip_serializing_if = "Citation::is_empty")]
+    #[serde(default, skip_serializing_if = "Citation::is_empty")]
     pub citation: Citation,
     /// How the numbers got from there to here.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -33,10 +33,10 @@ pub struct Source {
 }
 
 /// What a list of references needs beyond a title, a DOI and an address.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Citation {
     /// Authors, each as `Family, Given`; an organisation as it writes itself.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub authors: Vec<String>,
     /// Year of publication, 1000 to 9999.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -114,7 +114,7 @@ impl Making {
 }
 
 /// One sitting in which curves were measured.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Session {
     /// Key within the material.
     pub key: String,
@@ -191,7 +191,7 @@ pub struct Origin {
 }
 
 /// A file that a command read.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Input {
     /// Name of the file, without its folder.
     pub name: String,

@@ -2,7 +2,7 @@
 
 use std::io;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::ser::{CompactFormatter, Formatter, Serializer};
 
 use super::composition::{Layer, Permittivity, Roughness};
@@ -18,7 +18,7 @@ use crate::brdf::Brdf;
 use crate::formats::EffectEntry;
 
 /// One revision of a material.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Material {
     /// Short name that commands and scenes use.
     pub slug: Slug,
@@ -47,31 +47,31 @@ pub struct Material {
     /// Scattering models with their parameters.
     pub fits: Vec<Fit>,
     /// Physical effects beyond the scattering model, each once.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub effects: Vec<EffectEntry>,
     /// Whether it may still be used.
-    #[serde(skip_serializing_if = "Status::is_active")]
+    #[serde(default, skip_serializing_if = "Status::is_active")]
     pub status: Status,
     /// How the surface was made: rolled, sanded with grit 120, sprayed …
     #[serde(skip_serializing_if = "Option::is_none")]
     pub finish: Option<String>,
     /// What is not known, a sentence each.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unknown: Vec<String>,
     /// How rough the outer surface is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub roughness: Option<Roughness>,
     /// What it is made of, the outermost layer first.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub layers: Vec<Layer>,
     /// Permittivities of its substances.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub permittivities: Vec<Permittivity>,
     /// Sittings in which its curves were measured.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sessions: Vec<Session>,
     /// What diagnoses tried to explain it with.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<Finding>,
 }
 

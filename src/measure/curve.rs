@@ -8,6 +8,7 @@
 //! `censored` = 1: its power and its σ⁰ are those that it stayed below. Where not every row is backscatter,
 //! `theta_r_deg` and `delta_phi_deg` say from where it was seen.
 
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::formats::{ColumnNames, FormatError};
@@ -30,7 +31,7 @@ pub const COLUMNS: [&str; 9] = [
 ];
 
 /// A curve: observations in any order, each with a σ⁰ or the limit that it stayed below.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Curve {
     /// One per chirp. Of those that [`Curve::read`] and [`Curve::of_material`] give, a detection has a threshold where
     /// only detections were recorded, and none otherwise.

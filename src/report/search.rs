@@ -4,13 +4,15 @@ use serde::Serialize;
 
 use crate::error::Error;
 use crate::setup::{Database, store_of_not_added};
-use crate::store::{Match, Store};
+use crate::store::{Filter, Match, Store};
 
 /// What is looked for.
 #[derive(Clone, Copy, Debug)]
 pub struct MaterialSearch<'a> {
     /// Words, all of which must be there; the last may be a beginning.
     pub words: &'a str,
+    /// Which of the materials with these words are wanted.
+    pub filter: &'a Filter,
     /// How many materials are wanted at most.
     pub most: u32,
 }
@@ -41,7 +43,7 @@ impl MaterialSearch<'_> {
         let missing = store_of_not_added(store.as_ref())?;
         let mut hits = Vec::new();
         for (store, origin) in [(store.as_ref(), "database"), (Some(&missing), "built-in")] {
-            let search = |store: &Store| store.search(self.words, self.most);
+            let search = |store: &Store| store.search(self.words, self.filter, self.most);
             for hit in store.map_or(Ok(Vec::new()), search)? {
                 hits.push(MaterialHit { hit, origin });
             }

@@ -1,5 +1,6 @@
 //! Loading a scene: its file, its chirps and its target.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::error::SceneError;
@@ -7,6 +8,7 @@ use super::file::SceneFile;
 use super::read::{read_regular, read_text};
 use super::receivers;
 use super::target::{GivenMeshes, Target};
+use crate::material::Material;
 use crate::radar::{Chirps, Radar};
 
 /// A scene, ready to be rendered.
@@ -18,7 +20,12 @@ pub struct Scene {
     pub chirps: Chirps,
     /// What stands in front of it.
     pub target: Target,
+    /// Materials that are in no database.
+    pub given: GivenMaterials,
 }
+
+/// Materials by the names that regions give them, before any database is asked.
+pub type GivenMaterials = BTreeMap<String, Material>;
 
 impl Scene {
     /// The instrument.
@@ -52,17 +59,36 @@ impl Scene {
         path: &Path,
         given: &GivenMeshes,
     ) -> Result<Scene, SceneError> {
-        let folder = path.parent().unwrap_or(Path::new(""));
-        Scene::resolve_with(file, path, given, |name| {
-            read_regular(&folder.join(name)).map_err(|e| e.to_string())
-        })
+        let load = |file: &SceneFile| Target::load(file, path, given);
+        Scene::resolve_with(file, path, load, read_beside(path))
     }
 
-    /// As [`Scene::resolve_given`]; `read_csv` gives the bytes of its file of rays.
+    /// As [`Scene::resolve_given`], of a file that differs from that of this scene. Meshes are loaded only where the file
+    /// says other things of meshes or regions. Given materials are kept.
+    ///
+    /// # Errors
+    /// As [`Scene::resolve`].
+    pub fn replace(
+        &self,
+        file: SceneFile,
+        path: &Path,
+        given: &GivenMeshes,
+    ) -> Result<Scene, SceneError> {
+        let load = |file: &SceneFile| {
+            if file.mesh == self.file.mesh && file.region == self.file.region {
+                return Ok(self.target.clone());
+            }
+            Target::load(file, path, given)
+        };
+        let scene = Scene::resolve_with(file, path, load, read_beside(path))?;
+        Ok(Scene { given: self.given.clone(), ..scene })
+    }
+
+    /// As [`Scene::resolve`]; `load` gives its target and `read_csv` the bytes of its file of rays.
     pub(crate) fn resolve_with(
         mut file: SceneFile,
         path: &Path,
-        given: &GivenMeshes,
+        load: impl Fn(&SceneFile) -> Result<Target, SceneError>,
         read_csv: impl Fn(&str) -> Result<Vec<u8>, String>,
     ) -> Result<Scene, SceneError> {
         let at = |error| SceneError::Radar { file: path.to_owned(), error };
@@ -82,9 +108,15 @@ impl Scene {
         if file.name.is_empty() {
             file.name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         }
-        let target = Target::load(&file, path, given)?;
-        Ok(Scene { file, chirps, target })
+        let target = load(&file)?;
+        Ok(Scene { file, chirps, target, given: GivenMaterials::new() })
     }
+}
+
+/// Reads files beside a scene.
+fn read_beside(path: &Path) -> impl Fn(&str) -> Result<Vec<u8>, String> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    move |name| read_regular(&folder.join(name)).map_err(|error| error.to_string())
 }
 
 /// A spot needs a ray, and all rays together must fit into memory and patience.

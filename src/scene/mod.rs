@@ -14,7 +14,7 @@ mod target;
 
 pub use error::SceneError;
 pub use file::{BounceEntry, SceneFile};
-pub use load::Scene;
+pub use load::{GivenMaterials, Scene};
 pub(crate) use read::read_regular;
 pub use read::read_text;
 pub use reference::{ReferenceShape, ReferenceTarget};

@@ -96,7 +96,7 @@ impl MeshEntry {
 
 impl Target {
     /// Loads, places and joins the meshes of a scene, and assigns its regions.
-    pub(super) fn load(
+    pub(crate) fn load(
         file: &SceneFile,
         path: &Path,
         given: &GivenMeshes,

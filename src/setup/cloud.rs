@@ -38,6 +38,19 @@ pub fn absolute(cloud: Cloud, path: &Path) -> Result<Cloud, Error> {
     }
 }
 
+/// The pose of a shift x, y, z in m and, with three more numbers, turns about the fixed axes x, then y, then z in degrees;
+/// `None` for any others, and beyond 10 km.
+pub fn pose_of_numbers(numbers: &[f64]) -> Option<Pose<Global, Global>> {
+    let (turn_deg, shift_m) = match *numbers {
+        [x, y, z] => (DVec3::ZERO, DVec3::new(x, y, z)),
+        [x, y, z, rx, ry, rz] => (DVec3::new(rx, ry, rz), DVec3::new(x, y, z)),
+        _ => return None,
+    };
+    let are_usable = numbers.iter().all(|number| number.is_finite() && number.abs() <= 1e4);
+    let turn_rad = turn_deg * (std::f64::consts::PI / 180.0);
+    are_usable.then(|| Pose::from_euler_xyz(turn_rad, shift_m))
+}
+
 /// Reads the pose of a `pose.json`, as `matdb measure` writes it.
 ///
 /// # Errors

@@ -1,12 +1,14 @@
 //! Materials by the names that scenes and commands use: `NAME` or `NAME@REVISION`.
 
+use serde::{Deserialize, Serialize};
+
 use crate::error::Error;
 use crate::formats::text::nearest;
 use crate::material::{Material, Slug, builtin};
 use crate::store::{Store, StoreError, StoredRevision};
 
 /// A material and where it was found.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct MaterialRevision {
     /// The material.
     pub material: Material,

@@ -21,7 +21,7 @@ mod scene;
 mod validity;
 mod view;
 
-pub use cloud::{absolute, read_cloud, read_pose};
+pub use cloud::{absolute, pose_of_numbers, read_cloud, read_pose};
 pub use database::{Database, USUAL_DATABASE};
 pub use materials::{
     MaterialRevision, builtin_not_added, find_material, later_status_warning, status_warning,

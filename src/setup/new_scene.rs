@@ -11,7 +11,7 @@ use crate::formats::words::significant;
 use crate::frames::{Global, Point};
 use crate::material::Scale;
 use crate::measure::{Cloud, median_point, radar_place};
-use crate::scene::{GivenMeshes, Scene, SceneError, SceneFile};
+use crate::scene::{GivenMeshes, Scene, SceneError, SceneFile, Target};
 use crate::units::dbm_from_watts;
 
 /// What a scene is made of.
@@ -239,7 +239,8 @@ impl NewScene<'_> {
             mesh.file = path.map_or(mesh.file.clone(), |path| path.display().to_string());
         }
         let rays = files.get(1).map(|(_, bytes)| bytes.clone()).unwrap_or_default();
-        Ok(Scene::resolve_with(file, self.scene_file, &GivenMeshes::new(), |_| Ok(rays.clone()))?)
+        let load = |file: &SceneFile| Target::load(file, self.scene_file, &GivenMeshes::new());
+        Ok(Scene::resolve_with(file, self.scene_file, load, |_| Ok(rays.clone()))?)
     }
 }
 

@@ -424,7 +424,10 @@ fn find_materials(
         let known = materials.iter().position(|material| material.name == region.material);
         if known.is_none() {
             let asked_by = format!("{}: region `{}`: ", path.display(), region.name);
-            let found = find_material(store, &region.material, &asked_by)?;
+            let found = match scene.given.get(&region.material) {
+                Some(material) => MaterialRevision { material: material.clone(), revision: None },
+                None => find_material(store, &region.material, &asked_by)?,
+            };
             let scattering = found.material.scattering()?;
             let place = format!("{asked_by}material `{}`", found.material.slug);
             let effects = resolve_effects(&found.material.effects, Level::Material, place)?;

@@ -111,7 +111,7 @@ impl Store {
         outlined(&self.conn, filter).in_file(&self.path)
     }
 
-    /// The `most` materials that all these words are found in, the best first; the last word may be the
+    /// The `most` materials of a filter that all these words are found in, the best first; the last word may be the
     /// beginning of one. Names count most, then tags and class, then all else. Words are only words,
     /// whatever signs are in them; without a letter or digit nothing is found.
     ///
@@ -121,8 +121,13 @@ impl Store {
     /// # Errors
     /// When the file cannot be read; where the index of texts is not that of what is stored, which is compared up to
     /// 8 MiB.
-    pub fn search(&self, words: &str, most: u32) -> Result<Vec<Match>, StoreError> {
-        searched(&self.conn, words, most).in_file(&self.path)
+    pub fn search(
+        &self,
+        words: &str,
+        filter: &Filter,
+        most: u32,
+    ) -> Result<Vec<Match>, StoreError> {
+        searched(&self.conn, words, filter, most).in_file(&self.path)
     }
 }
 
@@ -141,11 +146,16 @@ fn marked(
     Ok(lines)
 }
 
-/// Materials with all these words; damaged ones are marked.
-fn searched(conn: &Connection, words: &str, most: u32) -> rusqlite::Result<Vec<Match>> {
+/// Materials of a filter with all these words; damaged ones are marked.
+fn searched(
+    conn: &Connection,
+    words: &str,
+    filter: &Filter,
+    most: u32,
+) -> rusqlite::Result<Vec<Match>> {
     let _moment = moment(conn)?;
     let stale = stale::stale_texts(conn)?;
-    let mut hits = words::search(conn, words, most)?;
+    let mut hits = words::search(conn, words, filter, most)?;
     for hit in &mut hits {
         hit.is_damaged = stale.iter().any(|slug| slug == hit.slug.as_str());
     }

@@ -143,7 +143,7 @@ const READS: [(&str, Read); 9] = [
     ("show", |path| Ok(format!("{:?}", answer(path)?))),
     ("list", |path| Ok(format!("{:?}", opened(path)?.list()?))),
     ("find", |path| Ok(format!("{:?}", opened(path)?.find(&Filter::default())?))),
-    ("search", |path| Ok(format!("{:?}", opened(path)?.search("paint", 10)?))),
+    ("search", |path| Ok(format!("{:?}", opened(path)?.search("paint", &Filter::default(), 10)?))),
     ("history", |path| Ok(format!("{:?}", opened(path)?.history(&"subject".parse().unwrap())?))),
     ("near", |path| {
         let observations = &lit("probe").curves[0].observations;

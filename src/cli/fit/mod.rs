@@ -149,15 +149,15 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     activity.end();
     let FitOutcome { subject, result, fit, stored, refusal } = outcome?;
     let material = subject.found.as_ref().map(|found| &found.material);
-    for condition in unmet_conditions(&fit.model, Radar::default().wavelength_m(), material) {
+    for condition in unmet_conditions(&fit.fit.model, Radar::default().wavelength_m(), material) {
         console.notice(&unmet_sentence(&condition));
     }
     let files = match &args.output {
-        Some(path) if result.converged => draw(path, &subject, &fit, console)?,
+        Some(path) if result.converged => draw(path, &subject, &fit.fit, console)?,
         _ => Vec::new(),
     };
     let saved = stored.as_ref();
-    let text = words::result(&subject, &fit, saved, &files);
+    let text = words::result(&subject, &fit.fit, saved, &files);
     let sentences = result.verdict.iter().map(ToString::to_string).collect();
     console.result(&text, &Record { result: &result, sentences, saved, files })?;
     refusal.map_or(Ok(()), Err)

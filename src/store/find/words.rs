@@ -2,8 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use rusqlite::{Connection, Result, Row, params};
+use rusqlite::types::Value;
+use rusqlite::{Connection, Result, Row, params, params_from_iter};
 
+use super::filter::{Filter, from_rarest};
 use crate::material::Slug;
 use crate::store::rows::rows;
 
@@ -33,16 +35,45 @@ const MOST_WORDS: usize = 32;
 /// A word in more materials than this is frequent.
 const RARE: u32 = 500;
 
-/// Up to `most` materials that have all these words.
-pub(super) fn search(conn: &Connection, words: &str, most: u32) -> Result<Vec<Match>> {
+/// The condition on materials besides their words.
+struct Among {
+    sql: String,
+    values: Vec<Value>,
+}
+
+impl Among {
+    /// The materials that match a filter.
+    fn new(conn: &Connection, filter: &Filter) -> Result<Among> {
+        if *filter == Filter::default() {
+            return Ok(Among { sql: String::new(), values: Vec::new() });
+        }
+        let (from, values) = from_rarest(conn, filter)?;
+        Ok(Among { sql: format!("AND entry.slug IN (SELECT slug {from})"), values })
+    }
+
+    /// Values for `first`, the condition, and `last`, as they stand in a query.
+    fn between(&self, first: &[&str], last: u32) -> Vec<Value> {
+        let first = first.iter().map(|text| Value::Text((*text).to_owned()));
+        first.chain(self.values.iter().cloned()).chain([Value::Integer(last.into())]).collect()
+    }
+}
+
+/// Up to `most` materials of a filter that have all these words.
+pub(super) fn search(
+    conn: &Connection,
+    words: &str,
+    filter: &Filter,
+    most: u32,
+) -> Result<Vec<Match>> {
     let phrases = phrases(words);
     if phrases.is_empty() {
         return Ok(Vec::new());
     }
+    let among = Among::new(conn, filter)?;
     if are_rare(conn, &phrases)? {
-        return ranked(conn, &beginning(&phrases), most);
+        return ranked(conn, &beginning(&phrases), &among, most);
     }
-    unranked(conn, words, &phrases, most)
+    unranked(conn, words, &phrases, &among, most)
 }
 
 /// Words in the syntax of the index: each as a phrase in quotes.
@@ -72,30 +103,42 @@ fn are_rare(conn: &Connection, phrases: &[String]) -> Result<bool> {
 }
 
 /// Materials with all words, the best first.
-fn ranked(conn: &Connection, query: &str, most: u32) -> Result<Vec<Match>> {
-    let sql = "
+fn ranked(conn: &Connection, query: &str, among: &Among, most: u32) -> Result<Vec<Match>> {
+    let sql = format!(
+        "
         SELECT search.slug, search.name, revision, status,
             snippet(search, -1, '[', ']', '…', 12), rank
         FROM search JOIN entry ON material_id = search.rowid
-        WHERE search MATCH ?1 AND rank MATCH 'bm25(10, 10, 5, 5, 1, 2, 1, 1)'
-        ORDER BY rank LIMIT ?2";
-    rows(conn, sql, params![query, most], hit)
+        WHERE search MATCH ? AND rank MATCH 'bm25(10, 10, 5, 5, 1, 2, 1, 1)' {}
+        ORDER BY rank LIMIT ?",
+        among.sql
+    );
+    rows(conn, &sql, params_from_iter(among.between(&[query], most)), hit)
 }
 
 /// Materials whose short name begins with the words, then those with the whole words, then all others.
-fn unranked(conn: &Connection, words: &str, phrases: &[String], most: u32) -> Result<Vec<Match>> {
-    let sql = "
+fn unranked(
+    conn: &Connection,
+    words: &str,
+    phrases: &[String],
+    among: &Among,
+    most: u32,
+) -> Result<Vec<Match>> {
+    let sql = format!(
+        "
         SELECT search.slug, search.name, revision, status,
             snippet(search, -1, '[', ']', '…', 12), 0.0
         FROM search JOIN entry ON material_id = search.rowid
-        WHERE search MATCH ?1 ORDER BY search.rowid LIMIT ?2";
-    let mut found = called(conn, words, most)?;
+        WHERE search MATCH ? {} ORDER BY search.rowid LIMIT ?",
+        among.sql
+    );
+    let mut found = called(conn, words, among, most)?;
     let wanted = usize::try_from(most).unwrap_or(usize::MAX);
     for query in [&phrases.join(" "), &beginning(phrases)] {
         if found.len() < wanted {
             // Some of these may be there already.
             let known: BTreeSet<Slug> = found.iter().map(|hit| hit.slug.clone()).collect();
-            let more = rows(conn, sql, params![query, most], hit)?;
+            let more = rows(conn, &sql, params_from_iter(among.between(&[query], most)), hit)?;
             found.extend(more.into_iter().filter(|hit| !known.contains(&hit.slug)));
         }
     }
@@ -104,13 +147,16 @@ fn unranked(conn: &Connection, words: &str, phrases: &[String], most: u32) -> Re
 }
 
 /// Materials whose short name begins with the words.
-fn called(conn: &Connection, words: &str, most: u32) -> Result<Vec<Match>> {
+fn called(conn: &Connection, words: &str, among: &Among, most: u32) -> Result<Vec<Match>> {
     let begin = words.split_whitespace().collect::<Vec<_>>().join("-").to_lowercase();
     // In ASCII, `~` comes after every character of a short name.
     let end = format!("{begin}~");
-    let sql = "SELECT slug, name, revision, status FROM entry
-               WHERE slug >= ?1 AND slug < ?2 ORDER BY slug LIMIT ?3";
-    rows(conn, sql, params![begin, end, most], |row| {
+    let sql = format!(
+        "SELECT slug, name, revision, status FROM entry
+         WHERE slug >= ? AND slug < ? {} ORDER BY slug LIMIT ?",
+        among.sql
+    );
+    rows(conn, &sql, params_from_iter(among.between(&[&begin, &end], most)), |row| {
         let slug: Slug = row.get(0)?;
         let rest = slug.as_str().strip_prefix(&begin).unwrap_or_default();
         let snippet = format!("[{begin}]{rest}");
