@@ -39,7 +39,7 @@ impl Table {
     }
 
     /// The column of a name, else `default`.
-    #[pyo3(signature = (name, default = None))]
+    #[pyo3(signature = (name, default = None, /))]
     fn get<'py>(
         &self,
         py: Python<'py>,
