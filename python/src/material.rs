@@ -13,7 +13,7 @@ use crate::json::{of_text, text_of, to_python};
 
 /// A material in one revision; or one of a function, for exploration.
 ///
-/// The function is sampled once, at 1025 angles from 0 to 90 degrees and, where the curve between them is more than 0.01 dB off,
+/// The function is sampled once, at 1025 angles from 0 to 89.99 degrees and, where the curve between them is more than 0.01 dB off,
 /// at up to 16385. Scenes render the curve: speed is that of any other material. `sampling_error_db` says how far the curve is
 /// off at most, up to 89 degrees. From the angle on from which the function gives -inf or NaN, nothing comes back.
 ///

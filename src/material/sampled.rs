@@ -25,6 +25,8 @@ const NAME: &str = "function";
 const INTERVALS: [usize; 2] = [1 << 10, 1 << 14];
 /// A difference that ends the refinement, dB.
 const GOOD_DB: f64 = 0.01;
+/// The last sample, degrees: at 90 no fit takes a point.
+const LAST_DEG: f64 = 89.99;
 /// Beyond this angle, degrees, levels fall so steeply that a difference says nothing.
 const JUDGED_DEG: f64 = 89.0;
 
@@ -73,7 +75,7 @@ impl SampledMaterial {
 
 /// The angle of a sample, degrees.
 fn angle_deg(k: usize, intervals: usize) -> f64 {
-    90.0 * (k as f64 / intervals as f64).powi(2)
+    LAST_DEG * (k as f64 / intervals as f64).powi(2)
 }
 
 /// Values with others between them.
@@ -175,7 +177,7 @@ fn material(slug: Slug, curve: Curve) -> Material {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brdf::{Brdf, CookTorrance, Lambert, Scattering};
+    use crate::brdf::{Brdf, Lambert, Scattering};
     use crate::units::db_from_ratio;
 
     fn sample(sigma0_db: impl Fn(f64) -> f64) -> Result<SampledMaterial, MaterialError> {
@@ -187,7 +189,8 @@ mod tests {
     fn a_sampled_law_is_the_law_to_a_hundredth_of_a_decibel() {
         let laws = [
             Brdf::Lambert(Lambert { albedo: 0.3 }),
-            Brdf::CookTorrance(CookTorrance { m: 0.02, ..CookTorrance::default() }),
+            serde_json::from_str(r#"{"model": "cook-torrance", "f_lambda": 0.05, "m": 0.02}"#)
+                .unwrap(),
         ];
         for law in laws {
             let sigma0_db = |deg: f64| db_from_ratio(law.sigma0(deg.to_radians()));
