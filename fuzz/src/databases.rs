@@ -219,7 +219,7 @@ fn patched(database: &[u8], mut runs: &[u8]) -> Vec<u8> {
 fn read_everything(path: &Path) {
     let Ok(Some(store)) = Store::open_frozen(path) else { return };
     let _ = (store.damage(), store.licences(), store.classes(), store.tags(9));
-    let _ = (store.search("paint", 9), store.outlines(&Filter::default()));
+    let _ = (store.search("paint", &Filter::default(), 9), store.outlines(&Filter::default()));
     let _ = store.count(&Filter { fitted: Some(true), ..Filter::default() }, 9);
     let slugs = store.list().map(|list| list.into_iter().map(|line| line.slug));
     let slugs: Vec<Slug> =
@@ -278,7 +278,7 @@ pub fn about(bytes: &[u8]) {
 pub fn words(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     BUILT_IN.with(|store| {
-        for found in store.search(text, 5).expect("words are only words") {
+        for found in store.search(text, &Filter::default(), 5).expect("words are only words") {
             assert!(store.holds(&found.slug).expect("a database that can be read"));
         }
         let filter = Filter { tag: Some(text.to_owned()), ..Filter::default() };
