@@ -18,10 +18,10 @@ PAGES = re.findall(r"\]\((.*?\.md)\)", (ROOT / "docs" / "SUMMARY.md").read_text(
 # By what a command is recognised in Python.
 TWINS = {
     "render": r"render\(", "calibrate": r"calibrate\(", "measure": r"measure\(", "compare": r"compare\(",
-    "diagnose": r"diagnose\(", "add": r"\.add\(", "list": r"list\(", "search": r"\.search\(", "near": r"\.near\(",
+    "diagnose": r"diagnose\(", "add": r"\.add\(", "list": r"list\(|\.materials\(", "search": r"\.search\(", "near": r"\.near\(",
     "show": r"\[\"[\w-]+\"\]", "diff": r"\.diff\(", "history": r"\.history\(", "cite": r"\.cite\(",
     "predict": r"\.predict\(", "fit": r"\bfit\(|, fit\b", "check": r"\.check\(", "rm": r"\.remove\(",
-    "withdraw": r"\.withdraw\(", "publish": r"\.publish\(", "import": r"\.import_catalogue\(", "export": r"\.export\(",
+    "withdraw": r"\.withdraw\(", "publish": r"\.publish\(", "verify": r"verify\(", "import": r"\.import_catalogue\(", "export": r"\.export\(",
 }
 # What is of the command line alone.
 ALONE = r"diagnose .*(--curve|--receiver|--add\b|--scene .*--scene)|render .*--beat|add .*--model"
