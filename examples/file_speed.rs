@@ -35,7 +35,7 @@ fn main() -> Answer<()> {
                 if how == ["uncompressed"] { Packing::Uncompressed } else { Packing::Zip16 };
             serve(|| {
                 let (ms, written) = timed(|| -> Answer<_> {
-                    let bytes = exr::write_packed(&raster, &[], packing)?;
+                    let bytes = exr::write_packed(&raster, &[], None, packing)?;
                     std::fs::write(file, &bytes)?;
                     Ok(bytes.len())
                 });

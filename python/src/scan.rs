@@ -9,7 +9,7 @@ use matdb::formats::ply::{Column, Scalar, Table};
 use matdb::geometry::Raster;
 use matdb::geometry::raster::Channel;
 use matdb::render::{Echo, RenderError, cloud_table};
-use matdb::report::{BeatShape, RenderFiles, RenderRequest, rendering_page};
+use matdb::report::{BeatShape, RenderFiles, RenderRequest, rendering_glb, rendering_page};
 use matdb::setup::{ReadyScene, View as Received};
 use matdb::trace::{Gpu, GpuError, Tracer};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
@@ -189,6 +189,15 @@ impl Scan {
     fn radar<'a, 'py>(&'a self, py: Python<'py>) -> PyResult<&'a Bound<'py, View>> {
         let (_, view) = self.views.first().ok_or_else(|| PyKeyError::new_err("no view"))?;
         Ok(view.bind(py))
+    }
+
+    /// A view by its name.
+    fn view(&self, wanted: &str) -> PyResult<&Py<View>> {
+        let named = self.views.iter().find(|(name, _)| name == wanted);
+        named.map(|(_, view)| view).ok_or_else(|| {
+            let names: Vec<&str> = self.views.iter().map(|(name, _)| name.as_str()).collect();
+            no_choice("view", wanted, &names.join(", "))
+        })
     }
 
     /// What the radar measured, as points.
@@ -492,16 +501,26 @@ impl Scan {
     ///     Name of one of `views`.
     #[pyo3(signature = (*, view = "radar"))]
     fn show(&self, py: Python<'_>, view: &str) -> PyResult<Page> {
-        let named = self.views.iter().find(|(name, _)| name == view);
-        let Some((_, view)) = named else {
-            let names: Vec<&str> = self.views.iter().map(|(name, _)| name.as_str()).collect();
-            return Err(no_choice("view", view, &names.join(", ")));
-        };
+        let view = self.view(view)?;
         let (cloud, image) = (view.get().table(py)?, view.get().raster(py)?);
         let materials: Vec<&str> = self.materials.iter().map(String::as_str).collect();
         let scene = self.scene.get().scene();
         let bytes = py.detach(|| rendering_page(scene, &cloud, &image, &materials));
         Ok(Page { html: String::from_utf8(bytes.map_err(raised)?)? })
+    }
+
+    /// The detections and the target as the bytes of a `.glb` file, which Blender, three.js and trimesh read.
+    ///
+    /// Parameters
+    /// ----------
+    /// view : str, default "radar"
+    ///     Name of one of `views`.
+    #[pyo3(signature = (*, view = "radar"))]
+    fn glb<'py>(&self, py: Python<'py>, view: &str) -> PyResult<Bound<'py, PyBytes>> {
+        let cloud = self.view(view)?.get().table(py)?;
+        let scene = self.scene.get().scene();
+        let bytes = py.detach(|| rendering_glb(scene, &cloud)).map_err(raised)?;
+        Ok(PyBytes::new(py, &bytes))
     }
 
     /// The power image, on axes of matplotlib.

@@ -1,11 +1,13 @@
-//! OpenEXR: a raster's channels as 32-bit floats, with their grid and their units.
+//! OpenEXR: a raster's channels as 32-bit floats, with their grid and their units, and a picture of them for viewers.
 //!
-//! One layer, ZIP in blocks of 16 lines or uncompressed; NaN is kept. The grid is in the attributes `pixelSizeM`,
+//! One layer, ZIP in blocks of 16 lines or uncompressed; NaN is kept. The picture is the channels `R`, `G` and `B`, 16-bit
+//! floats in linear light, which is what viewers show. The grid is in the attributes `pixelSizeM`,
 //! `xMinM` and `yMinM` (double, m) and a channel's unit in `<channel>.unit`. The same raster
 //! gives the same bytes on every run and any number of threads.
 
 use std::collections::HashMap;
 use std::io::Cursor;
+use std::ops::Range;
 
 use exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock};
 use exr::block::writer::ChunksWriter;
@@ -17,11 +19,13 @@ use exr::image::{AnyChannel, FlatSamples};
 use exr::meta::attribute::{AttributeValue, ChannelDescription, LineOrder, SampleType, Text};
 use exr::meta::header::{Header, LayerAttributes};
 use exr::meta::{BlockDescription, MetaData};
+use exr::prelude::f16;
 use miniz_oxide::deflate::{CompressionLevel, compress_to_vec_zlib};
 use rayon::prelude::*;
 use thiserror::Error;
 
 use super::error::FormatError;
+use super::light::light_of_srgb;
 use crate::geometry::raster::{Channel, Raster};
 
 /// How pixels are packed.
@@ -43,10 +47,10 @@ impl Packing {
         }
     }
 
-    fn pack<'a>(self, rows: impl Iterator<Item = &'a [f32]> + Clone) -> Vec<u8> {
+    fn pack(self, bytes: Vec<u8>) -> Vec<u8> {
         match self {
-            Packing::Zip16 => zipped(rows),
-            Packing::Uncompressed => plain(rows),
+            Packing::Zip16 => zipped(bytes),
+            Packing::Uncompressed => bytes,
         }
     }
 }
@@ -62,6 +66,9 @@ impl From<Packing> for Compression {
 
 /// How many bytes of pixels one byte of a file may unfold to; deflate stays below 1032.
 const MAX_UNFOLDING: usize = 2048;
+
+/// Channels of a picture, as viewers know them.
+const PICTURE: [&str; 3] = ["R", "G", "B"];
 
 /// Bytes that a file holds per block besides its pixels: its offset, its first line and its length.
 const BLOCK_OVERHEAD: usize = 16;
@@ -125,16 +132,18 @@ pub enum ExrError {
 /// # Errors
 /// When the raster contradicts itself, or a name is given twice or cannot be written.
 pub fn write(raster: &Raster, attributes: &[(String, Attribute)]) -> Result<Vec<u8>, ExrError> {
-    write_packed(raster, attributes, Packing::Zip16)
+    write_packed(raster, attributes, None, Packing::Zip16)
 }
 
-/// As [`write()`], with a choice of the packing.
+/// As [`write()`], with a picture for viewers and a choice of the packing. `picture`: red, green and blue (sRGB) of every
+/// pixel, row by row. It changes no other channel.
 ///
 /// # Errors
-/// When the raster contradicts itself, or a name is given twice or cannot be written.
+/// When the raster contradicts itself or its picture, or a name is given twice or cannot be written.
 pub fn write_packed(
     raster: &Raster,
     attributes: &[(String, Attribute)],
+    picture: Option<&[[u8; 3]]>,
     packing: Packing,
 ) -> Result<Vec<u8>, ExrError> {
     let layer_attributes = LayerAttributes {
@@ -142,10 +151,11 @@ pub fn write_packed(
         other: named_attributes(raster, attributes)?,
         ..LayerAttributes::default()
     };
-    let channels = checked_channels(raster)?;
+    let picture = picture.map_or_else(Vec::new, linear_light);
+    let channels = checked_channels(raster, &picture)?;
     let described = channels
         .iter()
-        .map(|(name, _)| ChannelDescription::named(name.clone(), SampleType::F32))
+        .map(|(name, samples)| ChannelDescription::named(name.clone(), samples.kind()))
         .collect();
     let size = (raster.width, raster.height);
     let header =
@@ -172,46 +182,85 @@ pub fn write_packed(
     Ok(with_sorted_header(file.into_inner()))
 }
 
+/// Values of a channel, row by row.
+#[derive(Clone, Copy)]
+enum Samples<'a> {
+    Float(&'a [f32]),
+    Half(&'a [f16]),
+}
+
+impl Samples<'_> {
+    fn kind(self) -> SampleType {
+        match self {
+            Samples::Float(_) => SampleType::F32,
+            Samples::Half(_) => SampleType::F16,
+        }
+    }
+
+    fn len(self) -> usize {
+        match self {
+            Samples::Float(values) => values.len(),
+            Samples::Half(values) => values.len(),
+        }
+    }
+
+    /// Adds some of the values to the pixels of a block.
+    fn write(self, part: Range<usize>, bytes: &mut Vec<u8>) {
+        match self {
+            Samples::Float(values) => {
+                bytes.extend(values[part].iter().flat_map(|value| value.to_le_bytes()));
+            }
+            Samples::Half(values) => {
+                bytes.extend(values[part].iter().flat_map(|value| value.to_le_bytes()));
+            }
+        }
+    }
+}
+
+/// Red, green and blue of a picture in linear light, each as a channel.
+fn linear_light(picture: &[[u8; 3]]) -> Vec<Vec<f16>> {
+    let light: Vec<f16> = (0..=255).map(|part| f16::from_f32(light_of_srgb(part))).collect();
+    let parts = (0..PICTURE.len()).map(|part| picture.iter().map(move |pixel| pixel[part]));
+    parts.map(|parts| parts.map(|part| light[usize::from(part)]).collect()).collect()
+}
+
 /// The pixels of one block: for each of its lines the rows of all channels.
 fn packed_block(
-    channels: &[(Text, &[f32])],
+    channels: &[(Text, Samples)],
     (width, height): (usize, usize),
     packing: Packing,
     number: usize,
 ) -> Vec<u8> {
     let lines = packing.lines() * number..height.min(packing.lines() * (number + 1));
-    let rows = lines.flat_map(|y| channels.iter().map(move |(_, values)| &values[y * width..]));
-    packing.pack(rows.map(|row| &row[..width]))
+    let pixel: usize = channels.iter().map(|(_, samples)| samples.kind().bytes_per_sample()).sum();
+    let mut bytes = Vec::with_capacity(lines.len() * width * pixel);
+    for y in lines {
+        channels
+            .iter()
+            .for_each(|(_, samples)| samples.write(y * width..(y + 1) * width, &mut bytes));
+    }
+    packing.pack(bytes)
 }
 
 /// A block of ZIP: bytes at even places, then those at odd places, all as differences from the one
 /// before (OpenEXR, `ImfZip.cpp`), deflated. It stays as it is where that would make it longer.
-fn zipped<'a>(rows: impl Iterator<Item = &'a [f32]> + Clone) -> Vec<u8> {
-    let bytes = 4 * rows.clone().map(<[f32]>::len).sum::<usize>();
-    let mut apart = vec![0; bytes];
-    let (even, odd) = apart.split_at_mut(bytes / 2);
-    let places = even.as_chunks_mut().0.iter_mut().zip(odd.as_chunks_mut().0);
-    for ((even, odd), value) in places.zip(rows.clone().flatten()) {
-        let [b0, b1, b2, b3] = value.to_le_bytes();
-        (*even, *odd) = ([b0, b2], [b1, b3]);
+fn zipped(bytes: Vec<u8>) -> Vec<u8> {
+    let mut apart = vec![0; bytes.len()];
+    // Samples have an even number of bytes.
+    let (even, odd) = apart.split_at_mut(bytes.len() / 2);
+    for ((even, odd), pair) in even.iter_mut().zip(odd).zip(bytes.as_chunks().0) {
+        [*even, *odd] = *pair;
     }
     let steps = apart.iter().zip(apart.iter().skip(1));
     let steps = steps.map(|(before, byte)| byte.wrapping_sub(*before).wrapping_add(128));
     let differences: Vec<u8> = apart.first().copied().into_iter().chain(steps).collect();
     // A higher level takes six times as long and saves 4 % of a power image.
     let deflated = compress_to_vec_zlib(&differences, CompressionLevel::BestSpeed as u8);
-    if deflated.len() < bytes { deflated } else { plain(rows) }
-}
-
-fn plain<'a>(rows: impl Iterator<Item = &'a [f32]> + Clone) -> Vec<u8> {
-    let mut values = Vec::with_capacity(rows.clone().map(<[f32]>::len).sum());
-    // Row by row, so that a row is copied and not gathered byte by byte.
-    rows.for_each(|row| values.extend(row.iter().map(|value| value.to_le_bytes())));
-    values.into_flattened()
+    if deflated.len() < bytes.len() { deflated } else { bytes }
 }
 
 /// The raster in an OpenEXR file: its first layer, as written by [`write()`] or by any tool that
-/// keeps the grid's three attributes. Channels come in alphabetical order.
+/// keeps the grid's three attributes. Channels come in alphabetical order, without those of a picture.
 pub fn read(bytes: &[u8]) -> Result<Raster, FormatError> {
     check_size(bytes)?;
     let image = exr::prelude::read()
@@ -226,24 +275,30 @@ pub fn read(bytes: &[u8]) -> Result<Raster, FormatError> {
     let layer = image.layer_data;
     let number = |name| grid_number(name, [&layer.attributes.other, &image.attributes.other]);
     let (pixel_m, x_min_m, y_min_m) = (number("pixelSizeM")?, number("xMinM")?, number("yMinM")?);
-    let channels = layer.channel_data.list.iter().map(channel).collect();
+    let data = layer.channel_data.list.iter().map(channel);
+    let channels = data.filter(|channel| !PICTURE.contains(&channel.name.as_str())).collect();
     Ok(Raster { width: layer.size.0, height: layer.size.1, x_min_m, y_min_m, pixel_m, channels })
 }
 
-/// The channels in the format's order, the alphabetical one.
-fn checked_channels(raster: &Raster) -> Result<Vec<(Text, &[f32])>, ExrError> {
+/// The channels of a raster and of its picture in the format's order, the alphabetical one.
+fn checked_channels<'a>(
+    raster: &'a Raster,
+    picture: &'a [Vec<f16>],
+) -> Result<Vec<(Text, Samples<'a>)>, ExrError> {
     let Raster { width, height, ref channels, .. } = *raster;
-    let mut checked: Vec<(Text, &[f32])> = Vec::new();
-    for Channel { name, values } in channels {
-        if width.checked_mul(height) != Some(values.len()) {
-            let (channel, values) = (name.clone(), values.len());
-            return Err(ExrError::Length { channel, values, width, height });
+    let data = channels.iter().map(|one| (one.name.as_str(), Samples::Float(&one.values)));
+    let shown = PICTURE.into_iter().zip(picture).map(|(name, part)| (name, Samples::Half(part)));
+    let mut checked: Vec<(Text, Samples)> = Vec::new();
+    for (name, samples) in data.chain(shown) {
+        let values = samples.len();
+        if width.checked_mul(height) != Some(values) {
+            return Err(ExrError::Length { channel: name.to_owned(), values, width, height });
         }
         let exr_name = checked_name(name)?;
         if checked.iter().any(|earlier| earlier.0 == exr_name) {
-            return Err(ExrError::Name { name: name.clone() });
+            return Err(ExrError::Name { name: name.to_owned() });
         }
-        checked.push((exr_name, values));
+        checked.push((exr_name, samples));
     }
     checked.sort_by(|a, b| a.0.cmp(&b.0));
     Ok(checked)
@@ -364,6 +419,8 @@ fn channel(channel: &AnyChannel<FlatSamples>) -> Channel {
 
 #[cfg(test)]
 mod tests {
+    use exr::math::Vec2;
+
     use super::*;
 
     fn raster(width: usize, height: usize) -> Raster {
@@ -393,15 +450,54 @@ mod tests {
         for (width, height) in [(125, 225), (1, 1), (33, 17)] {
             for packing in [Packing::Zip16, Packing::Uncompressed] {
                 let written = raster(width, height);
-                let read = read(&write_packed(&written, &notes(), packing).unwrap()).unwrap();
-                assert_eq!(bits(&read), bits(&written));
-                let without_values = |mut raster: Raster| {
-                    raster.channels.iter_mut().for_each(|c| c.values.clear());
-                    raster
-                };
-                assert_eq!(without_values(read), without_values(written));
+                let picture = vec![[0, 127, 255]; width * height];
+                for picture in [None, Some(picture.as_slice())] {
+                    let bytes = write_packed(&written, &notes(), picture, packing).unwrap();
+                    let read = read(&bytes).unwrap();
+                    assert_eq!(bits(&read), bits(&written));
+                    let without_values = |mut raster: Raster| {
+                        raster.channels.iter_mut().for_each(|c| c.values.clear());
+                        raster
+                    };
+                    assert_eq!(without_values(read), without_values(written.clone()));
+                }
             }
         }
+    }
+
+    #[test]
+    fn a_picture_is_what_viewers_show() {
+        let data = raster(5, 40);
+        let picture: Vec<[u8; 3]> = (0..200).map(|pixel| [0, pixel, 255]).collect();
+        let bytes = write_packed(&data, &[], Some(&picture), Packing::Zip16).unwrap();
+        let read = exr::prelude::read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .rgb_channels(
+                |size, _| vec![[0.0; 3]; size.area()],
+                |pixels: &mut Vec<[f32; 3]>, at, (red, green, blue): (f32, f32, f32)| {
+                    pixels[at.flat_index_for_size(Vec2(5, 40))] = [red, green, blue];
+                },
+            )
+            .first_valid_layer()
+            .all_attributes()
+            .from_buffered(Cursor::new(bytes))
+            .unwrap();
+        let shown = read.layer_data.channel_data.pixels;
+        assert_eq!(shown.len(), picture.len());
+        for (number, [red, green, blue]) in shown.iter().enumerate() {
+            let srgb = |light: f32| {
+                let part = if light <= 0.003_130_8 {
+                    12.92 * light
+                } else {
+                    1.055 * light.powf(1.0 / 2.4) - 0.055
+                };
+                (255.0 * part).round() as u8
+            };
+            assert_eq!([*red, *green, *blue].map(srgb), picture[number]);
+        }
+        let short = write_packed(&data, &[], Some(&picture[1..]), Packing::Zip16).unwrap_err();
+        assert!(matches!(short, ExrError::Length { values: 199, .. }), "{short}");
     }
 
     #[test]

@@ -54,7 +54,7 @@ pub use prediction::{PredictedLevel, Prediction, angles_deg};
 pub use radar::RadarReport;
 pub use scan::{
     BeatShape, Counts, PowerRange, ReceiverRecord, RegionRecord, RenderFiles, RenderProgress,
-    RenderRequest, RenderStage, ScanRecord,
+    RenderRequest, RenderStage, ScanRecord, rendering_glb,
 };
 pub use search::{MaterialHit, MaterialSearch};
 pub use shell::shell_word;

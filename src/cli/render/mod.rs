@@ -36,6 +36,9 @@ pub(super) struct Args {
     /// Also write view.html: the cloud in three dimensions, with target, radar and image, for a browser
     #[arg(long)]
     view: bool,
+    /// Also write cloud.glb: the cloud and the target as glTF, for Blender, three.js and other programs
+    #[arg(long)]
+    glb: bool,
     /// Also write the beat signals: beat.npy, chirps x samples; needs [radar.receiver]
     #[arg(long)]
     beat: bool,
@@ -64,6 +67,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         all_hits: args.all,
         beat,
         view: args.view,
+        glb: args.glb,
         crop: args.crop.is_some(),
         packing: if args.uncompressed { Packing::Uncompressed } else { Packing::Zip16 },
         ..RenderRequest::new(&ready)

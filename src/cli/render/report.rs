@@ -8,6 +8,7 @@ use super::stages::Stages;
 use crate::cli::console::Console;
 use crate::cli::summary::{grouped, table};
 use crate::error::Error;
+use crate::formats::words::listed;
 use crate::report::{Counts, ReceiverRecord, RenderFiles, ScanRecord};
 
 /// Prints the summary of a rendering that was written to `folder`, which ends the last stage.
@@ -20,16 +21,16 @@ pub(super) fn print(
     let (stages_ms, total_s) = stages.end();
     let (record, files) = (&rendered.record, words(rendered));
     record.notices().iter().for_each(|notice| console.notice(notice));
-    console.result(&text(folder, record, files, total_s), &value(folder, record, stages_ms))
+    console.result(&text(folder, record, &files, total_s), &value(folder, record, stages_ms))
 }
 
 /// The files of the radar's own view, in words.
-fn words(rendered: &RenderFiles) -> &'static str {
-    if rendered.files.iter().any(|(name, _)| name == "view.html") {
-        "power.exr, power.png, cloud.ply, view.html and scan.json"
-    } else {
-        "power.exr, power.png, cloud.ply and scan.json"
-    }
+fn words(rendered: &RenderFiles) -> String {
+    let mut names = vec!["power.exr", "power.png", "cloud.ply"];
+    let more = ["view.html", "cloud.glb"].into_iter();
+    names.extend(more.filter(|more| rendered.files.iter().any(|(name, _)| name == more)));
+    names.push("scan.json");
+    listed(&names)
 }
 
 fn text(folder: &Path, record: &ScanRecord, files: &str, total_s: f64) -> String {

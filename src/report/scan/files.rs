@@ -1,5 +1,6 @@
 //! The files of a rendering, as bytes: three for each antenna and polarisation that it receives.
 
+use super::glb::rendering_glb;
 use super::record::ScanRecord;
 use crate::error::Error;
 use crate::formats::exr::{self, Attribute, Packing};
@@ -23,6 +24,8 @@ pub(super) struct Content {
     pub packing: Packing,
     /// Whether there is a page that shows the cloud in three dimensions.
     pub view: bool,
+    /// Whether there is a file that other programs show in three dimensions.
+    pub glb: bool,
 }
 
 impl Content {
@@ -45,7 +48,9 @@ impl Content {
                     let attributes = exr_attributes(image, &materials);
                     let table = self.cloud(ready, view, &materials);
                     let cloud = ply::write_table(&table);
-                    (exr::write_packed(image, &attributes, self.packing), (table, cloud))
+                    let picture = colours_of(image.channel("power_dbm").unwrap_or_default());
+                    let exr = exr::write_packed(image, &attributes, Some(&picture), self.packing);
+                    (exr, (table, cloud))
                 },
             );
             files.push((view.file_name("power", "exr"), exr?));
@@ -54,6 +59,9 @@ impl Content {
             if self.view {
                 let page = rendering_page(scene, &table, image, &materials)?;
                 files.push((view.file_name("view", "html"), page));
+            }
+            if self.glb {
+                files.push((view.file_name("cloud", "glb"), rendering_glb(scene, &table)?));
             }
         }
         Ok(files)
@@ -96,7 +104,7 @@ pub(super) fn is_of_a_rendering(name: &str) -> bool {
     let quantity = stem.split_once('-').map_or(stem, |(quantity, _)| quantity);
     matches!(
         (quantity, extension),
-        ("power", "exr" | "png") | ("cloud", "ply") | ("beat", "npy") | ("view", "html")
+        ("power", "exr" | "png") | ("cloud", "ply" | "glb") | ("beat", "npy") | ("view", "html")
     )
 }
 

@@ -4,11 +4,13 @@
 mod beat;
 mod counts;
 mod files;
+mod glb;
 mod notices;
 mod record;
 mod request;
 
 pub use beat::BeatShape;
 pub use counts::{Counts, PowerRange, RegionRecord};
+pub use glb::rendering_glb;
 pub use record::{ReceiverRecord, ScanRecord};
 pub use request::{RenderFiles, RenderProgress, RenderRequest, RenderStage};

@@ -31,6 +31,8 @@ pub struct RenderRequest<'a> {
     pub packing: Packing,
     /// Whether there is a page for each antenna that shows its cloud in three dimensions.
     pub view: bool,
+    /// Whether there is a file for each antenna that other programs show in three dimensions.
+    pub glb: bool,
     /// Whether images end a spot beyond what any antenna detected.
     pub crop: bool,
 }
@@ -65,8 +67,8 @@ pub struct RenderFiles<'a> {
     pub images: Vec<Raster>,
     /// What `scan.json` holds.
     pub record: ScanRecord<'a>,
-    /// Names and bytes: `power.exr`, `power.png` and `cloud.ply` of every antenna, `scan.json`, and the beat signals
-    /// and the pages `view.html` that were asked for.
+    /// Names and bytes: `power.exr`, `power.png` and `cloud.ply` of every antenna, `scan.json`, and the beat signals,
+    /// the pages `view.html` and the files `cloud.glb` that were asked for.
     pub files: Vec<(String, Vec<u8>)>,
 }
 
@@ -97,6 +99,7 @@ impl<'a> RenderRequest<'a> {
             beat: None,
             packing,
             view: false,
+            glb: false,
             crop: false,
         }
     }
@@ -137,7 +140,7 @@ impl<'a> RenderRequest<'a> {
         let mut record =
             ScanRecord::new(ready, assembly.model(), &views, &crossed, &images, validity, all_hits);
         record.rays_ended = footprints.ended;
-        let content = Content { all_hits, packing: self.packing, view: self.view };
+        let content = Content { all_hits, packing: self.packing, view: self.view, glb: self.glb };
         let mut files = content.encode(ready, &views, &images, &record)?;
         files.extend(content.encode(ready, &crossed, &crossed_images, &record)?);
         files.push(("scan.json".to_owned(), json_file(&record)?));
