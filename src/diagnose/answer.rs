@@ -13,6 +13,7 @@ use super::subject::Subject;
 use super::views::Views;
 use crate::brdf::Brdf;
 use crate::effects::{Effect, Prediction, Receiver, Shot};
+use crate::frames::{Global, Pose};
 
 /// A model as the table of residuals shows it.
 #[derive(Clone, Copy)]
@@ -49,6 +50,7 @@ pub(super) fn rows(
             range_m: shot.hit.range_m,
             measured_range_m: seen.range_m,
             point: seen.point,
+            rank: seen.rank,
             range_residual_m: seen.range_m.zip(arrived).map(|(seen_m, a)| seen_m - a.range_m),
             xt_m: there.xt_m,
             yt_m: there.yt_m,
@@ -90,9 +92,10 @@ pub(super) fn base(subject: &Subject, state: &State, sd: &[f64]) -> Base {
 pub(super) fn effects(
     model: &Explanation,
     sd: &[f64],
-    shots: &[Shot],
+    (subject, views): (&Subject, &Views),
     unexplained: &[ResidualStructure],
 ) -> Vec<FoundEffect> {
+    let shots = &views.all_in_first(subject.shots);
     let has_other_form = unexplained.iter().any(|one| one.covariate == FORM_OF_SCATTER);
     let Explanation { state, added } = model;
     let mut rest = sd.iter().skip(state.space.base_len());
@@ -103,7 +106,8 @@ pub(super) fn effects(
         if has_other_form && effect.receive(&values, Receiver::LINEAR) != Receiver::LINEAR {
             sd.fill(f64::INFINITY);
         }
-        effects.push(found(*effect, &values, &sd, added, shots));
+        let motions = motions(*effect, &values, subject);
+        effects.push(FoundEffect { motions, ..found(*effect, &values, &sd, added, shots) });
     }
     effects
 }
@@ -130,8 +134,20 @@ fn found(
         class: added.class.clone(),
         parameters: Parameters::new(effect, numbers, place, shots),
         place,
+        motions: Vec::new(),
         evidence: added.evidence.clone(),
     }
+}
+
+/// How an effect moves the target from where the scene has it, as its scan first meets the target and as it last does.
+fn motions(effect: &dyn Effect, values: &[f64], subject: &Subject) -> Vec<Pose<Global, Global>> {
+    let scan = effect.scans().first().copied().unwrap_or(0);
+    let stage = &subject.stages[usize::from(scan)];
+    let mut own = subject.shots.iter().filter(|shot| shot.scan == scan);
+    let ends = [own.next(), own.next_back()].into_iter().flatten();
+    let mut motions: Vec<_> = ends.filter_map(|shot| effect.motion(values, stage, shot)).collect();
+    motions.dedup();
+    motions
 }
 
 /// A standard deviation; none where the data do not determine the number.

@@ -324,7 +324,15 @@ impl Scan<'_> {
         let mut beside = Vec::new();
         let Reported { returns, gate_cells: cells, cell_m, .. } = self.reported;
         let mut alarms = Alarms { weight: 1.0, returns, cells, cell_m, ..Alarms::default() };
-        for (point, chirp, index) in self.in_order(cloud, by_number, shots, &shots_of_chirp) {
+        let points = self.in_order(cloud, by_number, shots, &shots_of_chirp);
+        let mut powers_of_chirp: HashMap<u32, Vec<f64>> = HashMap::new();
+        if returns == Returns::All {
+            for (point, chirp, _) in &points {
+                let own = chirp.map(|chirp| powers_of_chirp.entry(chirp).or_default());
+                own.into_iter().for_each(|own| own.push(point.power_w));
+            }
+        }
+        for (point, chirp, index) in points {
             chirps_with_points.extend(chirp);
             if let Some((shot, observation)) =
                 index.and_then(|index| Some((shots.get(index)?, observations.get_mut(index)?)))
@@ -340,6 +348,10 @@ impl Scan<'_> {
                     on_target += 1;
                     *observation = Observation {
                         point: Some(point.point),
+                        rank: powers_of_chirp.get(&shot.chirp).map(|powers_w| {
+                            1 + powers_w.iter().filter(|other| **other > point.power_w).count()
+                                as u32
+                        }),
                         ..Observation::detected(point.power_w, Some(range_m))
                     };
                     // Noise hardly ever reaches more.

@@ -15,6 +15,9 @@ pub struct Observation {
     pub range_m: Option<f64>,
     /// Where the cloud has the detection; `None` where nothing was detected, or where the record is simulated.
     pub point: Option<Point<Global>>,
+    /// Place of the detection among those of its chirp, by power: 1 is the strongest; `None` where nothing was detected, or where
+    /// chirps report one detection at most.
+    pub rank: Option<u32>,
     /// Power that an echo without a detection stayed below, W: that of a false alarm which was reported instead, or
     /// 1 MW where a nearer detection ended the chirp; `None` for the threshold.
     pub limit_w: Option<f64>,
@@ -26,7 +29,7 @@ pub(super) const NO_LIMIT_W: f64 = 1e6;
 impl Observation {
     /// A detection.
     pub(super) fn detected(power_w: f64, range_m: Option<f64>) -> Observation {
-        Observation { power_w: Some(power_w), range_m, point: None, limit_w: None }
+        Observation { power_w: Some(power_w), range_m, ..Observation::default() }
     }
 
     /// Power that an echo without a detection stayed below, W.

@@ -10,7 +10,7 @@ use super::residual::ResidualStructure;
 use super::score::Errors;
 use crate::brdf::Brdf;
 use crate::effects::{Effect, Level, Place, Shot};
-use crate::frames::{Global, Point};
+use crate::frames::{Global, Point, Pose};
 
 /// Version of a report as JSON.
 pub const SCHEMA: u32 = 3;
@@ -129,6 +129,10 @@ pub struct FoundEffect {
     /// The part of the target where it acts; none where it acts everywhere.
     #[serde(skip)]
     pub place: Option<Place>,
+    /// From where the scene has the target to where the effect places it: as the scan meets it first and as it meets it last,
+    /// or once where these agree; empty for an effect that moves nothing.
+    #[serde(skip)]
+    pub motions: Vec<Pose<Global, Global>>,
     /// Why it was added.
     pub evidence: Evidence,
 }
@@ -270,6 +274,9 @@ pub struct Row {
     pub measured_range_m: Option<f64>,
     /// Where the cloud has the detection; none where nothing was detected.
     pub point: Option<Point<Global>>,
+    /// Place of the detection among those of its chirp, by power: 1 is the strongest; none where nothing was detected, or
+    /// where chirps report one detection at most.
+    pub rank: Option<u32>,
     /// Measured less predicted range with the effects, m; none where there is no range.
     pub range_residual_m: Option<f64>,
     /// x in the target plane, m; of several clouds in that of the first, where its antenna sees the same point of the target.

@@ -144,7 +144,7 @@ fn report(
     Report {
         schema: SCHEMA,
         verdict,
-        effects: answer::effects(model, &sd, &views.all_in_first(subject.shots), &unexplained),
+        effects: answer::effects(model, &sd, (subject, views), &unexplained),
         ranking: ranking.clone(),
         unexplained,
         error: answer::before_after(scorer, errors, with_unknown),

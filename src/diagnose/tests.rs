@@ -641,7 +641,13 @@ fn a_false_alarm_at_the_target_says_what_its_kind_of_return_says() {
     let all = matched(&points, Returns::All);
     assert_eq!(limits(&all), [None; 2]);
     assert_eq!((count(&all), all.alarms.silent, all.strays.len()), ([5, 5], sent, 0));
-    assert_eq!(all.observations[20..28], first.observations[20..28]);
+    for (one, alone) in std::iter::zip(&all.observations[20..28], &first.observations[20..28]) {
+        assert_eq!(*one, Observation { rank: Some(1), ..*alone });
+    }
+    // A stronger detection elsewhere on its ray makes an echo the second of its chirp.
+    points.push(CloudPoint { chirp: None, ..point(22, 0.5, 1e-8) });
+    let second = matched(&points, Returns::All);
+    assert_eq!([21, 22].map(|shot| second.observations[shot].rank), [Some(1), Some(2)]);
     // What a limit makes likely: silence least, and a hidden echo whatever it is.
     let model = Model { laws: vec![law()], receiver: receiver(), effects: vec![], level: 1.0 };
     let prediction = model.predict(&stage, &shots);

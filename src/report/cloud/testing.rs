@@ -26,6 +26,7 @@ pub(in crate::report) fn row() -> Row {
         range_m: 8.0,
         measured_range_m: Some(8.0),
         point: Some(Point::new(0.0, 1.1, 0.0)),
+        rank: None,
         range_residual_m: Some(0.0),
         xt_m: 0.0,
         yt_m: 0.0,

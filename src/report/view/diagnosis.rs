@@ -5,10 +5,10 @@ use glam::DVec3;
 use super::around::{in_plane, instrument, plane_image};
 use super::page::{Curve, Numbers, Outlines, PlaneImage, Points, Surface, Values, ViewPage};
 use crate::diagnose::{FoundEffect, Report, Row};
-use crate::effects::find;
 use crate::error::Error;
 use crate::formats::figure::Scale;
 use crate::formats::words::digits;
+use crate::geometry::Mesh;
 use crate::measure::nearest::Nearest;
 use crate::radar::RadarFrames;
 use crate::report::cloud::{CHANNEL, Outline, map_after};
@@ -34,21 +34,20 @@ pub(in crate::report) fn diagnosis_page(scene: &Scene, report: &Report) -> Resul
     let page = ViewPage {
         title: &scene.file.name,
         kind: "Diagnosed cloud",
-        notes: [first_of(report.clouds.len()), Surface::left_out(mesh), moved_by(&effects)]
+        notes: [first_of(report.clouds.len()), Surface::left_out(mesh), moved_by(&effects, mesh)]
             .into_iter()
             .flatten()
             .collect(),
-        is_moved: moved_by(&effects).is_some(),
         points: Points {
             count: detections.len(),
             position_m: Numbers::places(detections.iter().map(|one| one.point)),
             columns: columns(scene, &detections),
         },
         mesh: Surface::of(mesh),
-        radar: Some(instrument(scene)),
+        radar: instrument(scene),
         image: residual_image(scene, &rows)?,
-        shapes: outlines(scene, &rows, &effects),
-        curve: Some(Curve { x: "incidence_deg", y: "residual_after_db" }),
+        shapes: outlines(scene, &rows, &effects).into_iter().chain(moved(mesh, &effects)).collect(),
+        curve: Curve { x: "incidence_deg", y: "residual_after_db" },
     };
     page.bytes()
 }
@@ -75,13 +74,13 @@ fn acts_here(effect: &FoundEffect) -> bool {
     effect.scans.is_empty() || effect.scans.contains(&0)
 }
 
-/// A sentence on an effect that moves the target from where its mesh is drawn.
-fn moved_by(effects: &[&FoundEffect]) -> Option<String> {
-    let name = effects
-        .iter()
-        .map(|one| one.name)
-        .find(|name| find(name).is_some_and(|effect| effect.moves()))?;
-    Some(format!("The effect {name} moves the target; its mesh stays where the scene has it."))
+/// A sentence on an effect that moves the target from where the scene has it.
+fn moved_by(effects: &[&FoundEffect], mesh: &Mesh) -> Option<String> {
+    let name = effects.iter().find(|one| !one.motions.is_empty())?.name;
+    let drawn = Surface::of(mesh).map_or("", |_| {
+        " Its mesh is drawn in grey where the scene has it, and in colour where the effect places it."
+    });
+    Some(format!("The effect {name} moves the target.{drawn}"))
 }
 
 fn columns(scene: &Scene, detections: &[Detection]) -> Vec<Values> {
@@ -99,7 +98,7 @@ fn columns(scene: &Scene, detections: &[Detection]) -> Vec<Values> {
         let material = of_region.get(usize::from(one.row.region))?;
         materials.binary_search(material).ok()
     });
-    vec![
+    let mut columns = vec![
         number("residual_after_db", &|one| db_from_ratio(one.power_w / one.row.after_w)),
         number("residual_before_db", &|one| db_from_ratio(one.power_w / one.row.before_w)),
         number("power_dbm", &|one| dbm_from_watts(one.power_w)),
@@ -117,7 +116,12 @@ fn columns(scene: &Scene, detections: &[Detection]) -> Vec<Values> {
         number("chirp", &|one| one.row.chirp.into()),
         Values::named("region", &regions, "no region", region_of),
         Values::named("material", &materials, "no material", material_of),
-    ]
+    ];
+    let ranks = detections.iter().map(|one| one.row.rank);
+    if ranks.clone().flatten().next().is_some() {
+        columns.push(Values::ranks(ranks));
+    }
+    columns
 }
 
 /// The mean residual over the target plane; none without a detection.
@@ -145,6 +149,22 @@ fn outlines(scene: &Scene, rows: &[Row], effects: &[&FoundEffect]) -> Vec<Outlin
         Outlines::new(label, &places.collect::<Vec<_>>())
     });
     outlines.collect()
+}
+
+/// The mesh where effects place it; none of one that is not drawn.
+fn moved(mesh: &Mesh, effects: &[&FoundEffect]) -> Vec<Outlines> {
+    if Surface::of(mesh).is_none() {
+        return Vec::new();
+    }
+    let moved = effects.iter().flat_map(|effect| {
+        let times: &[&str] = match effect.motions.len() {
+            1 => &["target"],
+            _ => &["target as the scan begins", "target as it ends"],
+        };
+        let motions = times.iter().zip(&effect.motions);
+        motions.map(|(when, motion)| Outlines::moved(format!("{}: {when}", effect.name), *motion))
+    });
+    moved.collect()
 }
 
 /// The target as the chirps of one cloud meet it.
@@ -177,10 +197,13 @@ impl SeenTarget<'_> {
 mod tests {
     use std::path::Path;
 
+    use glam::DMat3;
+    use serde_json::Value;
+
     use super::*;
     use crate::diagnose::{Evidence, Parameters};
     use crate::effects::{Level, Place};
-    use crate::frames::Point;
+    use crate::frames::{Point, Pose};
     use crate::report::cloud::testing::{row, square};
 
     fn scene() -> Scene {
@@ -196,6 +219,7 @@ mod tests {
             class: Vec::new(),
             parameters: Parameters::default(),
             place: Some(Place::Round { x_m: 0.2, y_m: 0.2, radius_m: 0.1 }),
+            motions: Vec::new(),
             evidence: Evidence {
                 gain: 0.0,
                 placebo_gain: 0.0,
@@ -234,7 +258,21 @@ mod tests {
             serde_json::to_value(Numbers::floats([8.03].into_iter())).unwrap()
         );
         assert_eq!([&range["label"], &range["unit"]], ["range", "m"]);
-        assert_eq!(column("material")["names"], serde_json::json!(["steel", "no material"]));
+        assert_eq!(column("material")["names"], serde_json::json!(["steel"]));
+    }
+
+    #[test]
+    fn returns_have_entries_where_chirps_have_several() {
+        let column = |ranks: [Option<u32>; 2]| {
+            let rows = ranks.map(|rank| Row { rank, ..row() });
+            let columns = serde_json::to_value(columns(&scene(), &detections(&rows))).unwrap();
+            columns.as_array().unwrap().iter().find(|one| one["name"] == "rank").cloned()
+        };
+        assert_eq!(column([None, None]), None);
+        let ranks = column([Some(1), Some(3)]).unwrap();
+        assert_eq!(ranks["names"], serde_json::json!(["1", "2", "3"]));
+        assert_eq!(ranks["label"], "return number in the chirp, 1 the strongest");
+        assert_eq!(ranks["values"], serde_json::json!({ "u16": "AAACAA==" }));
     }
 
     #[test]
@@ -261,9 +299,15 @@ mod tests {
     fn a_page_says_what_it_does_not_show() {
         assert_eq!(first_of(0), None);
         assert!(first_of(3).unwrap().contains("the first of 3 clouds"));
-        let [patch, pose] = ["foreign-patch", "pose"].map(|name| found(name, vec![]));
-        assert_eq!(moved_by(&[&patch]), None);
-        assert!(moved_by(&[&patch, &pose]).unwrap().contains("pose moves the target"));
+        let mesh = scene().target.mesh;
+        let [patch, mut pose] = ["foreign-patch", "pose"].map(|name| found(name, vec![]));
+        pose.motions = vec![Pose::new(DMat3::IDENTITY, DVec3::new(0.0, 0.0, 0.03))];
+        assert_eq!(moved_by(&[&patch], &mesh), None);
+        assert!(moved_by(&[&patch, &pose], &mesh).unwrap().contains("pose moves the target. Its"));
+        let shapes = serde_json::to_value(moved(&mesh, &[&patch, &pose])).unwrap();
+        assert_eq!((&shapes[0]["label"], &shapes[1]), (&"pose: target".into(), &Value::Null));
+        assert_eq!(shapes[0]["motion"][14], 0.03);
+        assert!(moved(&Mesh::default(), &[&pose]).is_empty());
         let here = [vec![], vec![0, 2], vec![1]].map(|scans| acts_here(&found("pose", scans)));
         assert_eq!(here, [true, true, false]);
     }

@@ -1,6 +1,6 @@
 //! The data of `view.html`, as its script reads them.
 
-use glam::DVec3;
+use glam::{DMat4, DVec3};
 use serde::Serialize;
 
 use super::labels::label;
@@ -8,6 +8,7 @@ use crate::error::Error;
 use crate::formats::base64::base64;
 use crate::formats::figure::LESS_AND_MORE_HUE_DEG;
 use crate::formats::words::{counted, grouped};
+use crate::frames::{Global, Pose};
 use crate::geometry::Mesh;
 use crate::report::templates;
 
@@ -22,14 +23,12 @@ pub(in crate::report) struct ViewPage<'a> {
     /// Sentences on what the page leaves out.
     #[serde(skip)]
     pub notes: Vec<String>,
-    /// Whether the target has moved from where its mesh is drawn, which then dims no points at first.
-    pub is_moved: bool,
     pub points: Points,
     pub mesh: Option<Surface>,
-    pub radar: Option<Instrument>,
+    pub radar: Instrument,
     pub image: Option<PlaneImage>,
     pub shapes: Vec<Outlines>,
-    pub curve: Option<Curve>,
+    pub curve: Curve,
 }
 
 /// The points of a cloud.
@@ -93,6 +92,9 @@ pub(in crate::report) struct Outlines {
     lines_m: Numbers,
     /// Number of places up to the end of each line.
     ends: Vec<usize>,
+    /// A motion of the target, of which the edges of the mesh are drawn where it takes them: columns of a matrix of 4 × 4.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    motion: Option<[f64; 16]>,
 }
 
 /// Two columns that are drawn as a curve.
@@ -131,7 +133,7 @@ impl Values {
         Values { name: name.to_owned(), label: label.to_owned(), unit, values, names: None }
     }
 
-    /// Numbers of names. What has none gets a name of its own, `other`.
+    /// Numbers of names. What has none gets a name of its own, `other`, which is the last where it is needed.
     pub fn named(
         name: &str,
         names: &[&str],
@@ -139,12 +141,25 @@ impl Values {
         numbers: impl Iterator<Item = Option<usize>>,
     ) -> Values {
         let last = names.len().min(usize::from(u16::MAX));
-        let numbers = numbers.map(|number| number.map_or(last, |known| known.min(last)) as u16);
-        let bytes: Vec<u8> = numbers.flat_map(u16::to_le_bytes).collect();
-        let names = names.iter().chain([&other]).map(|name| (*name).to_owned()).collect();
+        let numbers: Vec<u16> =
+            numbers.map(|number| number.map_or(last, |known| known.min(last)) as u16).collect();
+        let other = numbers.contains(&(last as u16)).then_some(&other);
+        let bytes: Vec<u8> = numbers.into_iter().flat_map(u16::to_le_bytes).collect();
+        let names = names.iter().chain(other).map(|name| (*name).to_owned()).collect();
         let (label, unit) = label(name);
         let values = Numbers::U16(base64(&bytes));
         Values { name: name.to_owned(), label: label.to_owned(), unit, values, names: Some(names) }
+    }
+}
+
+impl Values {
+    /// Places of detections among those of their chirps, from 1, each as an entry of its own.
+    pub fn ranks(ranks: impl Iterator<Item = Option<u32>> + Clone) -> Values {
+        let last = ranks.clone().flatten().max().unwrap_or_default();
+        let names: Vec<String> = (1..=last).map(|rank| rank.to_string()).collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let numbers = ranks.map(|rank| Some(rank?.checked_sub(1)? as usize));
+        Values::named("rank", &names, "not known", numbers)
     }
 }
 
@@ -160,7 +175,16 @@ impl Outlines {
             label,
             lines_m: Numbers::places(line.into_iter()),
             ends,
+            motion: None,
         })
+    }
+
+    /// The mesh where a motion takes it.
+    pub fn moved(label: String, motion: Pose<Global, Global>) -> Outlines {
+        let motion =
+            DMat4::from_mat3_translation(motion.rotation(), motion.translation_m()).to_cols_array();
+        let (lines_m, ends) = (Numbers::places(std::iter::empty()), Vec::new());
+        Outlines { label, lines_m, ends, motion: Some(motion) }
     }
 }
 
@@ -238,21 +262,23 @@ mod tests {
         let small = Mesh { facets: vec![[0, 1, 2]; 2], ..large.clone() };
         assert!(Surface::of(&large).is_none() && Surface::of(&small).is_some());
         assert_eq!(Surface::left_out(&small), None);
+        let none = || Numbers::places(std::iter::empty());
+        let radar = Instrument {
+            origin_m: [0.0, 1.1, 8.0],
+            target_m: [0.0, 1.1, 0.0],
+            path_m: none(),
+            spot_m: none(),
+        };
         let page = ViewPage {
             title: "Large <mesh>",
             kind: "Rendered cloud",
             notes: Surface::left_out(&large).into_iter().collect(),
-            is_moved: false,
-            points: Points {
-                count: 0,
-                position_m: Numbers::places(std::iter::empty()),
-                columns: vec![],
-            },
+            points: Points { count: 0, position_m: none(), columns: vec![] },
             mesh: Surface::of(&large),
-            radar: None,
+            radar,
             image: None,
             shapes: vec![],
-            curve: None,
+            curve: Curve { x: "incidence_deg", y: "power_dbm" },
         };
         let page = String::from_utf8(page.bytes().unwrap()).unwrap();
         for words in ["Large &lt;mesh&gt;", "Rendered cloud of 0 points", "It has 300 001 facets"] {

@@ -30,13 +30,12 @@ pub fn rendering_page(
         title: &scene.file.name,
         kind: "Rendered cloud",
         notes: Surface::left_out(&scene.target.mesh).into_iter().collect(),
-        is_moved: false,
         points: points(cloud, &[("region", &regions), ("material", materials)]),
         mesh: Surface::of(&scene.target.mesh),
-        radar: Some(instrument(scene)),
+        radar: instrument(scene),
         image: Some(image),
         shapes: Vec::new(),
-        curve: Some(Curve { x: "incidence_deg", y: "power_dbm" }),
+        curve: Curve { x: "incidence_deg", y: "power_dbm" },
     };
     page.bytes()
 }
@@ -51,6 +50,9 @@ fn points(cloud: &Table, named: &[(&str, &[&str])]) -> Points {
     let columns = columns.into_iter().map(|column| {
         let names = named.iter().find(|(name, _)| *name == column.name);
         let values = column.values.iter().copied();
+        if column.name == "rank" {
+            return Values::ranks(values.map(|rank| Some(rank as u32)));
+        }
         names.map_or_else(
             || Values::numbers(&column.name, values.clone()),
             |(name, names)| {
