@@ -413,6 +413,21 @@ def test_a_fit_of_arrays_becomes_a_material(scene):
     assert "specular.m" in both.parameters
 
 
+def test_another_program_opens_a_scan(scene):
+    import trimesh
+
+    scan = md.render(scene)
+    opened = trimesh.load_scene(trimesh.util.wrap_as_stream(scan.glb()), file_type="glb")
+    assert set(opened.geometry) == {"cloud", "all"} and opened.metadata["unit"] == "m"
+    cloud, plate = opened.geometry["cloud"], opened.geometry["all"]
+    assert np.allclose(cloud.vertices, scan.xyz_m, atol=1e-6)
+    strongest, weakest = cloud.colors[np.argmax(scan.points_dbm)], cloud.colors[np.argmin(scan.points_dbm)]
+    assert strongest[0] > 200 > weakest[0] and (cloud.colors[:, 3] == 255).all()
+    assert np.allclose(plate.bounds, [[-0.5, 0.6, 0], [0.5, 1.6, 0]]) and plate.visual.material.name == "mannequin-paint"
+    with pytest.raises(md.UsageError, match="view"):
+        scan.glb(view="another")
+
+
 def test_a_scan_is_shown_and_plotted(scene):
     import matplotlib
 
@@ -426,6 +441,9 @@ def test_a_scan_is_shown_and_plotted(scene):
     said = command(Path.cwd(), "render", "plate.toml", "-o", "out", "--view")
     assert said.returncode == 0, said.stderr
     assert Path("out/view.html").exists()
+    said = command(Path.cwd(), "render", "plate.toml", "-o", "out", "--glb")
+    assert said.returncode == 0 and "cloud.glb" in said.stdout, said.stderr
+    assert Path("out/cloud.glb").exists()
     curve = md.measure(md.Cloud(scan.xyz_m, scan.points_dbm), scene)
     for axes in [scan.plot(), curve.plot(), curve.fit("lambert").plot()]:
         assert axes.get_xlabel() and axes.get_ylabel()
