@@ -167,4 +167,24 @@ fn a_diagnosis_shows_residuals_and_where_its_effects_act() {
     let state: Value = browser.script("return window.matdbView.state()");
     assert!(state.to_string().contains("residual_after_db"), "{state}");
     was_quiet(&browser);
+
+    // A pose that was found draws the mesh where it places the target, until it is switched off; it dims no points at first.
+    let page = std::fs::read_to_string(why.join("view.html")).unwrap();
+    let moved = json!({
+        "label": "pose: target",
+        "lines_m": { "f32": "" },
+        "ends": [],
+        "motion": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.2, 0, 0, 1],
+    });
+    let shapes = "\"shapes\":[";
+    assert_eq!(page.matches(shapes).count(), 1);
+    let page = page.replace(shapes, &format!("{shapes}{moved},"));
+    std::fs::write(folder.path().join("moved.html"), page).unwrap();
+    open(&browser, &folder.path().join("moved.html"));
+    let said = browser.text("return document.querySelector('#shapes').innerText");
+    assert!(said.contains("pose: target") && said.contains("foreign-patch: outline"), "{said}");
+    assert_eq!(browser.script("return window.matdbView.state().dim"), json!(false));
+    browser.script("document.querySelector('#shapes input').click()");
+    assert_eq!(browser.script("return window.matdbView.state().shapesOff"), json!([0]));
+    was_quiet(&browser);
 }

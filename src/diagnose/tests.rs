@@ -396,6 +396,9 @@ fn a_target_that_has_moved_far_is_found_by_its_ranges() {
             .map(|values| library[1].motion(values, &bench.stage(), &shot).unwrap() * origin);
         assert!(found.distance_m(truth) < 0.003, "{index}: {found:?}");
     }
+    // A page draws the target where it stood as the scan met it first and last.
+    let [first, last] = report.effects[0].motions[..] else { panic!() };
+    assert!((first * origin).distance_m(last * origin) > 0.03);
     assert!(report.error.after.rmse_db < 1.05 * report.error.after.noise_floor_db);
 }
 
