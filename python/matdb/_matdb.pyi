@@ -498,6 +498,7 @@ def render(
     seed: int | None = None,
     all_hits: bool = False,
     view: bool = False,
+    glb: bool = False,
     beat: bool = False,
     crop: bool = False,
     uncompressed: bool = False,

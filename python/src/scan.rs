@@ -81,6 +81,8 @@ pub(crate) struct Page {
 ///     Whether the files `cloud.ply` hold every hit, not only detections.
 /// view : bool, default False
 ///     Whether there are files `view.html`, too, as `Scan.show` makes them.
+/// glb : bool, default False
+///     Whether there are files `cloud.glb`, too, as `Scan.glb` makes them.
 /// beat : bool, default False
 ///     Whether there are files `beat.npy`, too: the beat signals of a radar with a receiver.
 /// crop : bool, default False
@@ -99,8 +101,8 @@ pub(crate) struct Page {
 /// matdb.MaterialError, matdb.RenderError
 ///     Materials that are not known, and what cannot be rendered.
 #[pyfunction]
-#[pyo3(signature = (scene, *, db = None, seed = None, all_hits = false, view = false, beat = false, crop = false,
-                    uncompressed = false, tracer = None))]
+#[pyo3(signature = (scene, *, db = None, seed = None, all_hits = false, view = false, glb = false, beat = false,
+                    crop = false, uncompressed = false, tracer = None))]
 #[expect(clippy::too_many_arguments, reason = "each is a keyword in Python")]
 pub(crate) fn render(
     py: Python<'_>,
@@ -109,6 +111,7 @@ pub(crate) fn render(
     seed: Option<u64>,
     all_hits: bool,
     view: bool,
+    glb: bool,
     beat: bool,
     crop: bool,
     uncompressed: bool,
@@ -144,6 +147,7 @@ pub(crate) fn render(
             all_hits,
             beat: beat.then(|| BeatShape::new(&ready.scene)).transpose()?,
             view,
+            glb,
             crop,
             packing: if uncompressed { Packing::Uncompressed } else { Packing::Zip16 },
             ..RenderRequest::new(&ready)

@@ -594,7 +594,7 @@ def test_effects_and_publications_are_those_of_the_command_line(scene, tmp_path)
 
 @pytest.mark.parametrize("keyword, flags", [
     ({"all_hits": True}, ["--all"]),
-    ({"view": True}, ["--view"]),
+    ({"view": True, "glb": True}, ["--view", "--glb"]),
     ({"crop": True}, ["--crop", "auto"]),
     ({"uncompressed": True}, ["--uncompressed"]),
     ({"tracer": "brute"}, ["--tracer", "brute"]),
