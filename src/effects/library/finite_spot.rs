@@ -616,7 +616,8 @@ mod tests {
                     continue;
                 };
                 let fresh = (0..).zip(laws).fold(Sums::default(), |sums, (region, law)| {
-                    let f = |beam_rad, v| law.seen_by(beam_rad, v, v).f_per_sr;
+                    let seen = |&(beam_rad, v): &Asked| law.seen_by(beam_rad, v, v).f_per_sr;
+                    let f = |asked: &[Asked]| asked.iter().map(seen).collect();
                     let share = |beam_rad, v| law.seen_by(beam_rad, v, v).coherent_share;
                     sums.and(1.0, &Sums::of(spot, &weights(0.02), region, f, share))
                 });
