@@ -273,8 +273,8 @@ impl Scene {
         format!("<matdb.Scene {}: {} chirps, {facets} facets>", self.name(), self.chirps())
     }
 
-    /// Writes its file, with the meshes that are in no file beside it as PLY, and the materials that it was given as
-    /// `material-NAME.toml`, which `Database.add` takes.
+    /// Writes its file, with the meshes that are in no file beside it as PLY, and the laws of the materials that it was
+    /// given as `material-NAME.toml`, which `Database.add` takes.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let (mut table, mut files) = (self.table()?, Vec::new());
         for (number, entry) in entries(&mut table, "mesh").enumerate() {
@@ -287,8 +287,8 @@ impl Scene {
         }
         for (key, material) in &self.scene.given {
             let name = &material.slug;
-            let file =
-                file::write(material).map_err(|error| UsageError::new_err(error.to_string()))?;
+            let file = file::write(&material.with_law_alone().map_err(raised)?)
+                .map_err(|error| UsageError::new_err(error.to_string()))?;
             files.push((format!("material-{name}.toml"), file.into_bytes()));
             for entry in entries(&mut table, "region") {
                 if entry.get("material").and_then(Value::as_str) == Some(key) {

@@ -90,6 +90,32 @@ impl Material {
         curve.tabulated().map(Brdf::Tabulated)
     }
 
+    /// The material with the law alone that a scene renders, for a file without curves beside it: a rendered curve becomes
+    /// a tabulated law.
+    ///
+    /// # Errors
+    /// As [`Material::scattering`].
+    pub fn with_law_alone(&self) -> Result<Material, MaterialError> {
+        let fit = match self.rendered_fit() {
+            Some(fit) => Fit { curve: None, report: None, ..fit.clone() },
+            None => Fit {
+                name: self.render.clone(),
+                model: self.scattering()?,
+                estimator: "stated".to_owned(),
+                curve: None,
+                lobes: self.rendered_lobes(),
+                source: self
+                    .rendered_curve()
+                    .map_or_else(String::new, |curve| curve.source.clone()),
+                parameter_sources: Vec::new(),
+                covariance: None,
+                report: None,
+            },
+        };
+        let (curves, findings) = (Vec::new(), Vec::new());
+        Ok(Material { curves, findings, fits: vec![fit], ..self.clone() })
+    }
+
     /// ε′ and ε″ at the frequency nearest to this one, Hz: of the only substance that has a permittivity, or of the one
     /// whose key is the material's own name. `None` for any other material.
     pub fn permittivity_near(&self, frequency_hz: f64) -> Option<[f64; 2]> {

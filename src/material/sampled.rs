@@ -197,6 +197,10 @@ mod tests {
             let sampled = sample(sigma0_db).unwrap();
             assert!(sampled.error_db <= GOOD_DB, "{}", sampled.error_db);
             sampled.material.validate().unwrap();
+            let alone = sampled.material.with_law_alone().unwrap();
+            let text = crate::material::file::write(&alone).unwrap();
+            let read = crate::material::file::parse("mine", &text, |_| Err(String::new())).unwrap();
+            assert_eq!(read.scattering().unwrap(), sampled.material.scattering().unwrap());
             let own = sampled.material.scattering().unwrap();
             // Angles that were no samples.
             for k in 0..3000 {
