@@ -294,8 +294,9 @@ fn raster(given: Rendering, finer: f64) -> Raster {
 /// Image and cloud to bytes, and these into a folder.
 fn files(given: Rendering<'_>) -> Vec<Way<'_>> {
     let raster = raster(given, 1.0);
-    let exr =
-        |raster: &Raster, packing| exr::write_packed(raster, &[], None, packing).expect("a picture");
+    let exr = |raster: &Raster, packing| {
+        exr::write_packed(raster, &[], None, packing).expect("a picture")
+    };
     let cloud = move || {
         let echoes: Vec<&Echo> = given.scan.detections().collect();
         ply::write_table(&cloud_table(&echoes, &[0], &["body"], &["paint"], false))
