@@ -68,7 +68,6 @@ pub struct Surface<'a> {
 }
 
 // Numbers by which glTF names types of numbers, uses of numbers, and ways to draw.
-const UNSIGNED_SHORT: u32 = 5123;
 const UNSIGNED_INT: u32 = 5125;
 const FLOAT: u32 = 5126;
 const OF_VERTICES: u32 = 34962;
@@ -167,13 +166,10 @@ struct Numbers {
 
 impl Numbers {
     fn cloud(&mut self, cloud: &Cloud) -> Value {
-        let light = |part: u8| (f32::from(u16::MAX) * light_of_srgb(part)).round() as u16;
-        let colours = cloud.colours.iter().flat_map(|[red, green, blue]| {
-            [light(*red), light(*green), light(*blue), u16::MAX].map(u16::to_le_bytes)
-        });
+        let parts = cloud.colours.as_flattened().iter();
+        let colours = parts.flat_map(|part| light_of_srgb(*part).to_le_bytes()).collect();
         let mut attributes = json!({ "POSITION": self.places(cloud.places_m.iter().copied()) });
-        let colours: Vec<u8> = colours.flatten().collect();
-        attributes["COLOR_0"] = self.list(colours, OF_VERTICES, UNSIGNED_SHORT, "VEC4");
+        attributes["COLOR_0"] = self.list(colours, OF_VERTICES, FLOAT, "VEC3");
         for (name, values) in &cloud.values {
             let values = values.iter().flat_map(|value| value.to_le_bytes()).collect();
             let list = self.list(values, OF_VERTICES, FLOAT, "SCALAR");
@@ -218,19 +214,13 @@ impl Numbers {
         list
     }
 
-    /// A list of numbers; its number. Every list has a multiple of four bytes, where the format wants the next one to begin.
+    /// A list of numbers of four bytes, or of threes of such; its number.
     fn list(&mut self, bytes: Vec<u8>, target: u32, component: u32, kind: &str) -> Value {
-        let parts = match kind {
-            "VEC3" => 3,
-            "VEC4" => 4,
-            _ => 1,
-        };
-        let size = if component == UNSIGNED_SHORT { 2 } else { 4 };
+        let size = if kind == "VEC3" { 12 } else { 4 };
         self.accessors.push(json!({
             "bufferView": self.views.len(),
             "componentType": component,
-            "normalized": component == UNSIGNED_SHORT,
-            "count": bytes.len() / (parts * size),
+            "count": bytes.len() / size,
             "type": kind,
         }));
         self.views.push(json!({
@@ -310,8 +300,8 @@ mod tests {
         assert_eq!((&places["count"], &places["type"]), (&json!(2), &json!("VEC3")));
         assert_eq!(places["max"], json!([0.1f32, 3.0, 8.0]));
         let (colours, bytes) = part(&points["attributes"]["COLOR_0"]);
-        assert_eq!((&colours["normalized"], bytes.len()), (&json!(true), 16));
-        assert_eq!(bytes[..8], [255, 255, 0, 0, 66, 55, 255, 255]);
+        assert_eq!((&colours["count"], &colours["type"]), (&json!(2), &json!("VEC3")));
+        assert_eq!(floats(bytes), [1.0, 0.0, light_of_srgb(128), 0.0, 0.0, 0.0]);
         let (_, bytes) = part(&points["attributes"]["_POWER_DBM"]);
         assert_eq!(floats(bytes), [-60.0, -20.5]);
         // The surface without facets is left out, as is a vertex of no facet.
