@@ -2,8 +2,8 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The latest results of a slow function by what they depend on. By default it holds as many as a
-/// difference quotient over every parameter of a pose needs, with its middle and the next one.
+/// The latest results of a slow function by what they depend on. By default it holds those of a dozen points around the one
+/// that a search stands at, with it and the next one.
 pub(super) struct Cache<K, V, const MOST: usize = 15>(Mutex<Vec<(K, Arc<V>)>>);
 
 impl<K, V, const MOST: usize> Default for Cache<K, V, MOST> {

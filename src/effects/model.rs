@@ -214,12 +214,13 @@ impl Model<'_> {
     ) -> Vec<Prediction> {
         let ways: Vec<Pose<Global, Global>> =
             twists.iter().map(|twist| twisted(stage.middle, twist)).collect();
+        let laws = self.retros();
         let echoes = |shots: &[Shot]| {
             let of_ways = self.intersect_twisted(stage, shots, &ways);
             let echoes = of_ways.into_iter().map(|shots| {
                 let surfaces = Surfaces {
                     coherent: &self.coherent_shares(stage, &shots),
-                    f_per_sr: &self.f_per_sr(stage, &self.retros(), &shots),
+                    f_per_sr: &self.f_per_sr(stage, &laws, &shots),
                     gains: &self.gains(stage, &shots),
                 };
                 self.echoes(stage, &shots, surfaces)
