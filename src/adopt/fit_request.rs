@@ -6,7 +6,7 @@ use super::fit_subject::FitSubject;
 use crate::brdf::Brdf;
 use crate::error::Error;
 use crate::fit::coordinates::frequencies;
-use crate::fit::{Fit, FitResult, Method, model, model_names};
+use crate::fit::{Fit, FitResult, Method, OwnLaw, model, model_names};
 use crate::formats::ColumnNames;
 use crate::formats::text::nearest;
 use crate::radar::speckle::standard_deviation_db;
@@ -25,6 +25,8 @@ pub struct FitRequest<'a> {
     pub columns: ColumnNames,
     /// A model or a material, where the search starts; by default what the material renders, else `mixture`.
     pub model: Option<&'a str>,
+    /// A law of a program's own, in the place of a model; such a fit cannot be stored.
+    pub own: Option<(&'a str, &'a OwnLaw)>,
     /// How to fit.
     pub method: FitMethod,
     /// The exponent of the diffuse tail, held.
@@ -64,13 +66,22 @@ pub enum FitMethod {
     Censored,
 }
 
+/// Where the search of a fit starts.
+#[derive(Clone, Debug)]
+pub enum FitStart {
+    /// A model with its values.
+    Model(Brdf),
+    /// A law of a program's own, by its name.
+    Own(String, OwnLaw),
+}
+
 /// A request whose curve is loaded and that nothing hinders.
 #[derive(Debug)]
 pub struct CheckedFit {
     /// What is fitted.
     pub subject: FitSubject,
-    /// The model where the search starts.
-    pub start: Brdf,
+    /// Where the search starts.
+    pub start: FitStart,
     /// Settings of the fit.
     pub fit: Fit,
     /// Name of the fit.
@@ -116,6 +127,7 @@ impl<'a> FitRequest<'a> {
             curve: None,
             columns: ColumnNames::default(),
             model: None,
+            own: None,
             method: FitMethod::Censored,
             alpha: None,
             fixed: Vec::new(),
@@ -163,8 +175,15 @@ impl<'a> FitRequest<'a> {
         Ok(CheckedFit { subject, start, fit, fit_name, notices, storage: self.storage })
     }
 
-    /// The model where the search begins.
-    fn start(&self, subject: &FitSubject, store: Option<&Store>) -> Result<Brdf, Error> {
+    /// Where the search begins.
+    fn start(&self, subject: &FitSubject, store: Option<&Store>) -> Result<FitStart, Error> {
+        match self.own {
+            Some((name, law)) => Ok(FitStart::Own(name.to_owned(), law.clone())),
+            None => self.model_at_start(subject, store).map(FitStart::Model),
+        }
+    }
+
+    fn model_at_start(&self, subject: &FitSubject, store: Option<&Store>) -> Result<Brdf, Error> {
         let Some(name) = self.model else {
             let default = subject.rendered_model().or_else(|| model("mixture"));
             return default.ok_or_else(|| no_model("mixture"));
@@ -179,7 +198,7 @@ impl<'a> FitRequest<'a> {
         }
     }
 
-    fn settings(&self, subject: &FitSubject, start: &Brdf) -> Result<Fit, Error> {
+    fn settings(&self, subject: &FitSubject, start: &FitStart) -> Result<Fit, Error> {
         let (lacking, rows) = (subject.curve.without_power(), subject.curve.observations.len());
         if self.noise_w.is_some() && lacking > 0 {
             return Err(Error::usage(
@@ -205,8 +224,8 @@ impl<'a> FitRequest<'a> {
     }
 
     /// The held parameters, each checked to be one of the model's: those that are named, and the model's frequencies.
-    fn held(&self, start: &Brdf) -> Result<Vec<(String, f64)>, Error> {
-        let paths: Vec<String> = start.parameters().into_iter().map(|p| p.path).collect();
+    fn held(&self, start: &FitStart) -> Result<Vec<(String, f64)>, Error> {
+        let paths = start.paths();
         let mut held = Vec::from_iter(self.held_alpha(&paths)?);
         for (path, value) in &self.fixed {
             if !paths.contains(path) {
@@ -218,7 +237,7 @@ impl<'a> FitRequest<'a> {
             }
             held.push((path.clone(), *value));
         }
-        let mut own = frequencies(start);
+        let mut own = start.frequencies();
         own.retain(|(path, _)| !is_held(path, &held));
         held.extend(own);
         Ok(held)
@@ -243,12 +262,33 @@ impl<'a> FitRequest<'a> {
         }
     }
 
-    fn name(&self, start: &Brdf) -> String {
+    fn name(&self, start: &FitStart) -> String {
         if let Some(name) = self.fit_name {
             return name.to_owned();
         }
-        let model = self.model.map_or_else(|| model_word(start), str::to_owned);
+        let model = match start {
+            FitStart::Own(name, _) => name.clone(),
+            FitStart::Model(law) => self.model.map_or_else(|| model_word(law), str::to_owned),
+        };
         format!("{model}-{}", self.method.as_str())
+    }
+}
+
+impl FitStart {
+    /// The numbers that can be held, by path.
+    fn paths(&self) -> Vec<String> {
+        match self {
+            FitStart::Model(law) => law.parameters().into_iter().map(|known| known.path).collect(),
+            FitStart::Own(_, law) => law.parameters().iter().map(|own| own.name.clone()).collect(),
+        }
+    }
+
+    /// The frequencies in a model, which belong to the radar.
+    fn frequencies(&self) -> Vec<(String, f64)> {
+        match self {
+            FitStart::Model(law) => frequencies(law),
+            FitStart::Own(..) => Vec::new(),
+        }
     }
 }
 
@@ -261,9 +301,12 @@ impl CheckedFit {
     /// the [refusal](FitOutcome::refusal) of its outcome.
     pub fn run(self, database: &Database) -> Result<FitOutcome, Error> {
         let CheckedFit { subject, start, fit, fit_name, storage, .. } = self;
-        let mut result = fit
-            .run(&start, &subject.curve)
-            .map_err(|error| Error::Fit { curve: subject.label.clone(), error })?;
+        let found = match &start {
+            FitStart::Model(law) => fit.run(law, &subject.curve),
+            FitStart::Own(_, law) => fit.run_own(law, &subject.curve),
+        };
+        let mut result =
+            found.map_err(|error| Error::Fit { curve: subject.label.clone(), error })?;
         let (mut stored, mut refusal) = (None, None);
         let is_possible = result.model.validate().is_ok();
         if !result.converged {

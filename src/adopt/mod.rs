@@ -26,7 +26,7 @@ pub use catalogue_import::CatalogueImport;
 pub use curve::{AddedCurve, CurveOrigin, add_curve, check_frequency_and_threshold};
 pub use database_check::{CheckProgress, CheckReport, DatabaseCheck};
 pub use earlier::{Earlier, check_folder};
-pub use fit_request::{CheckedFit, FitMethod, FitOutcome, FitRequest};
+pub use fit_request::{CheckedFit, FitMethod, FitOutcome, FitRequest, FitStart};
 pub use fit_storage::{FitStorage, NewFit, StoredFit};
 pub use fit_subject::FitSubject;
 pub use fitted_material::FittedMaterial;

@@ -8,8 +8,9 @@
 use nalgebra::DVector;
 
 use super::error::FitError;
+use super::own_law::{OwnLaw, OwnParameter};
 use super::table::{Aspects, Table};
-use crate::brdf::{Brdf, Mixture, Parameter};
+use crate::brdf::{Brdf, Mixture, Parameter, ParameterError};
 use crate::radar::random::{Key, Purpose};
 
 /// Name of the specular level S = (1 − k)·f_λ.
@@ -166,7 +167,7 @@ impl Coordinate {
 pub(crate) struct Coordinates {
     /// In the order of the search.
     pub list: Vec<Coordinate>,
-    base: Brdf,
+    base: Base,
     /// k of the mixture whose levels are searched as products.
     gauge: Option<f64>,
     looks: f64,
@@ -176,6 +177,14 @@ pub(crate) struct Coordinates {
     beam_rad: f64,
     /// Whether levels that no law can have, S + R > 1, are lowered together.
     lowers_levels: bool,
+}
+
+/// What the numbers are of.
+#[derive(Clone, Debug, PartialEq)]
+enum Base {
+    Law(Brdf),
+    /// With the value of each parameter, where it is not searched.
+    Own(OwnLaw, Vec<f64>),
 }
 
 /// The frequencies in a law: they belong to the radar, so that a fit must not search them.
@@ -229,12 +238,52 @@ impl Coordinates {
         }
         base.validate()?;
         let gauge = gauge(&base, fixed);
-        let mut list: Vec<Coordinate> = base
+        let list = base
             .parameters()
             .into_iter()
             .filter(|parameter| !is_fixed(fixed, &parameter.path))
-            .filter_map(|parameter| coordinate(&base, gauge, &parameter))
-            .collect();
+            .filter_map(|parameter| coordinate(&base, gauge, &parameter));
+        Coordinates::listed(list.collect(), Base::Law(base), bounds, looks, gauge)
+    }
+
+    /// The coordinates of a law of a program's own, as [`Coordinates::new`].
+    ///
+    /// # Errors
+    /// As [`Coordinates::new`].
+    pub fn of_own(
+        law: &OwnLaw,
+        fixed: &[(String, f64)],
+        bounds: &[(String, [f64; 2])],
+        looks: Option<f64>,
+    ) -> Result<Coordinates, FitError> {
+        let known = law.parameters();
+        let mut values: Vec<f64> = known.iter().map(|parameter| parameter.start).collect();
+        for (name, value) in fixed {
+            let Some(place) = known.iter().position(|parameter| parameter.name == *name) else {
+                return Err(FitError::UnknownParameter { name: name.clone() });
+            };
+            let OwnParameter { min, max, .. } = known[place];
+            if !(min..=max).contains(value) {
+                let (path, value) = (name.clone(), *value);
+                return Err(ParameterError { path, value, min, max }.into());
+            }
+            values[place] = *value;
+        }
+        let free = known.iter().filter(|parameter| !is_fixed(fixed, &parameter.name));
+        let list = free.map(|OwnParameter { name, min, max, start }| {
+            Coordinate::new(name, (*min, *max), *start)
+        });
+        let base = Base::Own(law.clone(), values);
+        Coordinates::listed(list.collect(), base, bounds, looks, None)
+    }
+
+    fn listed(
+        mut list: Vec<Coordinate>,
+        base: Base,
+        bounds: &[(String, [f64; 2])],
+        looks: Option<f64>,
+        gauge: Option<f64>,
+    ) -> Result<Coordinates, FitError> {
         if looks.is_none() {
             list.push(Coordinate::new(LOOKS, LOOKS_RANGE, 1.0));
         }
@@ -328,7 +377,10 @@ impl Coordinates {
 
     /// The model at a point of the search.
     pub fn model(&self, at: &DVector<f64>) -> Brdf {
-        let mut model = self.base.clone();
+        let mut model = match &self.base {
+            Base::Law(law) => law.clone(),
+            Base::Own(law, values) => return law.at(&self.own_values(law, values, at)),
+        };
         let mut levels = [0.0; 2];
         for (coordinate, value) in self.list.iter().zip(self.values(at)) {
             match coordinate.name.as_str() {
@@ -348,6 +400,16 @@ impl Coordinates {
         model
     }
 
+    /// The values of all parameters of a law of a program's own.
+    fn own_values(&self, law: &OwnLaw, values: &[f64], at: &DVector<f64>) -> Vec<f64> {
+        let found = self.values(at);
+        let value = |(parameter, held): (&OwnParameter, &f64)| {
+            let place = self.list.iter().position(|coordinate| coordinate.name == parameter.name);
+            place.map_or(*held, |place| found[place])
+        };
+        law.parameters().iter().zip(values).map(value).collect()
+    }
+
     /// ln σ⁰ of the model at a point of the search, as the beam sees it.
     pub(super) fn table(&self, at: &DVector<f64>, aspects: &Aspects) -> Table {
         Table::new(&self.model(at), self.beam_rad, aspects)
@@ -360,7 +422,7 @@ impl Coordinates {
 
     /// Whether the model is a mixture, and which of its coordinates are of its diffuse part.
     pub fn is_diffuse(&self) -> Option<Vec<bool>> {
-        matches!(self.base, Brdf::Mixture(_))
+        matches!(self.base, Base::Law(Brdf::Mixture(_)))
             .then(|| self.list.iter().map(Coordinate::is_diffuse).collect())
     }
 }

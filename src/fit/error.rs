@@ -42,6 +42,15 @@ pub enum FitError {
         /// Row, from 0.
         row: usize,
     },
+    /// A row whose source and receiver were in two directions, for a law of the angle of incidence alone.
+    #[error(
+        "in row {row} (from 0) source and receiver were in two directions, and a function of the angle of incidence knows \
+         backscatter alone; fit a model"
+    )]
+    OwnPairs {
+        /// Row, from 0.
+        row: usize,
+    },
     /// A value of a row is out of range.
     #[error("row {row} (from 0) has {name} = {}, {wanted}; correct or remove it", shown(*value))]
     Row {

@@ -2,6 +2,7 @@
 
 use super::coordinates::{Coordinates, DIFFUSE_LEVEL, LOOKS, SPECULAR_LEVEL};
 use super::error::FitError;
+use super::own_law::OwnLaw;
 use super::parts::Parts;
 use super::result::FitResult;
 use super::search::SearchResult;
@@ -18,9 +19,33 @@ impl Fit {
     /// A setting, a start or a row without a meaning, a curve without detections or with fewer than
     /// unknowns. What else the data do not determine is in the [verdict](FitResult::verdict).
     pub fn run(&self, start: &Brdf, curve: &Curve) -> Result<FitResult, FitError> {
+        let looks = self.checked_looks(curve)?;
+        let are_retro = curve.observations.iter().all(Observation::is_retro);
+        let of = if are_retro { Coordinates::new } else { Coordinates::of_pairs };
+        if curve.illumination.relative && !are_retro {
+            return Err(FitError::RelativePairs);
+        }
+        self.run_from(of(start, &self.fixed, &self.bounds, looks)?, curve)
+    }
+
+    /// As [`Fit::run`], of a law of a program's own. The model of the result is the law at the values that were found, as a
+    /// table.
+    ///
+    /// # Errors
+    /// As [`Fit::run`], and a curve of which source and receiver were in two directions.
+    pub fn run_own(&self, law: &OwnLaw, curve: &Curve) -> Result<FitResult, FitError> {
+        let looks = self.checked_looks(curve)?;
+        if let Some(row) = curve.observations.iter().position(|row| !row.is_retro()) {
+            return Err(FitError::OwnPairs { row });
+        }
+        self.run_from(Coordinates::of_own(law, &self.fixed, &self.bounds, looks)?, curve)
+    }
+
+    /// Checks settings and rows.
+    fn checked_looks(&self, curve: &Curve) -> Result<Option<f64>, FitError> {
         self.validate()?;
         check_rows(&curve.observations)?;
-        let looks = match self.method {
+        Ok(match self.method {
             Method::Censored => self.looks,
             Method::Mse { .. } | Method::Tls { .. } => {
                 if let Some(row) = curve.observations.iter().position(|row| !row.is_retro()) {
@@ -28,14 +53,11 @@ impl Fit {
                 }
                 Some(self.looks.unwrap_or(1.0))
             }
-        };
-        let are_retro = curve.observations.iter().all(Observation::is_retro);
-        let of = if are_retro { Coordinates::new } else { Coordinates::of_pairs };
-        if curve.illumination.relative && !are_retro {
-            return Err(FitError::RelativePairs);
-        }
-        let mut coordinates =
-            of(start, &self.fixed, &self.bounds, looks)?.seen_by(self.beam_rad.unwrap_or(0.0));
+        })
+    }
+
+    fn run_from(&self, coordinates: Coordinates, curve: &Curve) -> Result<FitResult, FitError> {
+        let mut coordinates = coordinates.seen_by(self.beam_rad.unwrap_or(0.0));
         if self.method == Method::Censored {
             coordinates.redundant = Parts::of(&coordinates, &curve.observations).redundant;
         }

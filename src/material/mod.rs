@@ -41,6 +41,7 @@ pub use reach::Reach;
 pub use report::{CrossValidation, Estimate, FitReport, FixedNumber, Goodness};
 pub use revision::Material;
 pub use sampled::SampledMaterial;
+pub(crate) use sampled::sampled_law;
 pub use slug::Slug;
 pub use status::Status;
 pub use texts::LONGEST_TEXT_BYTES;

@@ -6,6 +6,7 @@ use super::provenance::{Citation, Source, SourceKind};
 use super::revision::Material;
 use super::slug::Slug;
 use super::status::Status;
+use crate::brdf::Brdf;
 use crate::units::ratio_from_db;
 
 /// A material whose curve was sampled from a function.
@@ -71,6 +72,18 @@ impl SampledMaterial {
             intervals *= 2;
         }
     }
+}
+
+/// The law of a function that gives σ⁰, dB, of angles of incidence, degrees, as fine as the coarsest samples.
+///
+/// # Errors
+/// As [`SampledMaterial::new`].
+pub(crate) fn sampled_law(
+    mut sigma0_db: impl FnMut(&[f64]) -> Vec<f64>,
+) -> Result<Brdf, MaterialError> {
+    let angles_deg: Vec<f64> = (0..=INTERVALS[0]).map(|k| angle_deg(k, INTERVALS[0])).collect();
+    let levels_db = levels(&mut |angles_deg: &[f64]| Ok(sigma0_db(angles_deg)), &angles_deg)?;
+    curve(&angles_deg, &levels_db)?.tabulated().map(Brdf::Tabulated)
 }
 
 /// The angle of a sample, degrees.
@@ -177,7 +190,7 @@ fn material(slug: Slug, curve: Curve) -> Material {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brdf::{Brdf, Lambert, Scattering};
+    use crate::brdf::{Lambert, Scattering};
     use crate::units::db_from_ratio;
 
     fn sample(sigma0_db: impl Fn(f64) -> f64) -> Result<SampledMaterial, MaterialError> {
