@@ -17,6 +17,7 @@ use serde_json::Value;
 use crate::cloud::CloudLike;
 use crate::database::Database;
 use crate::error::{UsageError, raised};
+use crate::interrupt::interruptible;
 use crate::json::to_python;
 use crate::pose::PoseLike;
 use crate::scene::SceneLike;
@@ -57,7 +58,8 @@ pub(crate) fn compare(
 ) -> PyResult<Comparison> {
     let scene = scene.scene(py)?;
     let scene = scene.get();
-    let compared = py.detach(|| {
+    let effects = scene.own_effects(py)?;
+    let compared = interruptible(py, |_| {
         let store = db.map_or(Ok(None), Database::read)?;
         let pose = match pose.map(|pose| pose.start()).transpose()? {
             None => Pose::NONE,
@@ -70,6 +72,7 @@ pub(crate) fn compare(
         };
         let mut ready =
             ReadyScene::new_mean(scene.scene().clone(), scene.path(), pose, store.as_ref())?;
+        ready = ready.with_own_effects(effects);
         drop(store);
         if let Some(name) = fit {
             ready.choose_fit(name)?;
@@ -81,7 +84,7 @@ pub(crate) fn compare(
         let notices = [cloud.notices, ready.notices(), Vec::from_iter(unstated)].concat();
         let record = comparison.record(cloud_path, scene.path(), &notices);
         Ok(Comparison { comparison, record })
-    });
+    })?;
     compared.map_err(raised::<Error>)
 }
 
@@ -115,16 +118,18 @@ pub(crate) fn calibrate<'py>(
     }
     let scene = scene.scene(py)?;
     let scene = scene.get();
-    let record = py.detach(|| -> Result<Value, Error> {
+    let effects = scene.own_effects(py)?;
+    let record = interruptible(py, |_| -> Result<Value, Error> {
         let store = db.map_or(Ok(None), Database::read)?;
         let ready = ReadyScene::new(scene.scene().clone(), scene.path(), store.as_ref())?;
+        let ready = ready.with_own_effects(effects);
         drop(store);
         let path = cloud.path();
         let cloud = absolute(cloud.read()?.into_owned(), path)?;
         let report = CalibrationReport::new(&ready, &cloud, path, Calibration { within_db })?;
         let notices = [cloud.notices, ready.notices(), report.notices()].concat();
         Ok(report.record(path, scene.path(), &notices))
-    });
+    })?;
     to_python(py, &record.map_err(raised)?)
 }
 

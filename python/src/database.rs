@@ -70,6 +70,11 @@ impl Database {
         given: Details,
         keep_render: bool,
     ) -> PyResult<Vec<String>> {
+        if fit.is_own() {
+            let problem = "a fit of a function of a program cannot be stored; save a Material of the function with the \
+                           parameters of the fit, and add that file";
+            return Err(UsageError::new_err(problem));
+        }
         let slug = name.parse::<Slug>();
         let slug = slug.map_err(|error| UsageError::new_err(error.to_string()))?;
         let own = fit.measured.as_ref();

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf, absolute};
 use matdb::adopt::{
     CheckedRequest, CloudRequest, Earlier, Publication, check_folder, input, moved_scene,
 };
-use matdb::effects::find;
+use matdb::effects::{EffectList, find};
 use matdb::error::Error;
 use matdb::files::{folder_of, write_all};
 use matdb::report::EffectHelp;
@@ -17,6 +17,7 @@ use serde_json::{Value, json};
 
 use crate::cloud::CloudLike;
 use crate::database::Database;
+use crate::effect::Effect;
 use crate::error::{UsageError, raised};
 use crate::interrupt::interruptible;
 use crate::json::{of_text, text_of, to_python};
@@ -53,6 +54,8 @@ pub(crate) struct Diagnosis {
 ///     The receiver of the scene that the cloud is of; the radar itself unless stated.
 /// effects : list of str, optional
 ///     Names of the effects to try; all unless stated. `matdb.effects()` lists them.
+/// own_effects : list of Effect, optional
+///     Effects of one's own, which are tried as well. The scene that is found does not declare them.
 /// seed : int, default 0
 /// controls : bool, default True
 ///     Whether controls are computed, which take as long as the diagnosis.
@@ -66,7 +69,7 @@ pub(crate) struct Diagnosis {
 /// matdb.DiagnoseError
 ///     Too few data, or data that are not of this scene.
 #[pyfunction]
-#[pyo3(signature = (cloud, scene, *, db = None, receiver = None, effects = Vec::new(), seed = 0, controls = true))]
+#[pyo3(signature = (cloud, scene, *, db = None, receiver = None, effects = Vec::new(), own_effects = Vec::new(), seed = 0, controls = true))]
 #[expect(clippy::too_many_arguments, reason = "each is a keyword in Python")]
 pub(crate) fn diagnose(
     py: Python<'_>,
@@ -75,6 +78,7 @@ pub(crate) fn diagnose(
     db: Option<&Database>,
     receiver: Option<&str>,
     effects: Vec<String>,
+    own_effects: Vec<Py<Effect>>,
     seed: u64,
     controls: bool,
 ) -> PyResult<Diagnosis> {
@@ -84,7 +88,15 @@ pub(crate) fn diagnose(
         find(name).ok_or_else(unknown)
     });
     let effects = effects.collect::<PyResult<Vec<_>>>()?;
+    let own: Vec<_> = own_effects.iter().map(|effect| effect.get().effect()).collect();
+    for (number, effect) in own.iter().enumerate() {
+        if own[..number].iter().any(|other| other.name() == effect.name()) {
+            let problem = format!("two effects are called {}", effect.name());
+            return Err(UsageError::new_err(format!("{problem}; give one another name")));
+        }
+    }
     let scene = scene.get();
+    let declared = scene.own_effects(py)?;
     let answer = interruptible(py, |stop| {
         let request = CloudRequest {
             cloud: cloud.path(),
@@ -92,13 +104,14 @@ pub(crate) fn diagnose(
             further: &[],
             receiver,
             effects: &effects,
+            own_effects: &own,
             material: None,
             seed,
             controls,
             folder: Path::new(""),
             add: false,
         };
-        let checked = check(request, scene, database.as_ref())?;
+        let checked = check(request, scene, declared, database.as_ref())?;
         let given = vec![cloud.input()?, input(scene.path(), scene.own_text().as_bytes())];
         let checked = CheckedRequest { given, ..checked };
         let clouds = checked.read_clouds(|_, _| Ok(cloud.read()?.into_owned()))?;
@@ -122,11 +135,16 @@ pub(crate) fn diagnose(
 fn check<'a>(
     request: CloudRequest<'a>,
     scene: &Scene,
+    declared: EffectList,
     database: Option<&setup::Database>,
 ) -> Result<CheckedRequest<'a>, Error> {
     let store = database.map(setup::Database::read).transpose()?.flatten();
     let ready = ReadyScene::new(scene.scene().clone(), scene.path(), store.as_ref())?;
-    request.check_ready(ready, scene.own_text().to_owned(), store.as_ref())
+    request.check_ready(
+        ready.with_own_effects(declared),
+        scene.own_text().to_owned(),
+        store.as_ref(),
+    )
 }
 
 /// The physical effects that `diagnose` looks for: what each is, how it shows, and its numbers, as `matdb effects --json` prints

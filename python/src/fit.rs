@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use matdb::adopt::{FitMethod, FitOutcome, FitRequest, FitSubject, NewFit};
 use matdb::error::Error;
+use matdb::fit::OwnParameter;
 use matdb::formats::ColumnNames;
 use matdb::material::FitReport;
 use matdb::setup;
@@ -18,6 +19,7 @@ use serde_json::{Value, json};
 use crate::cloud::column_names;
 use crate::database::Database;
 use crate::error::{no_choice, raised};
+use crate::interrupt::interruptible;
 use crate::json::{of_text, text_of, to_python};
 use crate::material::{Material, sigma0_db};
 use crate::measure::{Instrument, Measurement};
@@ -31,6 +33,9 @@ pub(crate) struct Fit {
     pub(crate) subject: FitSubject,
     /// What a curve was measured with that was measured here.
     pub(crate) measured: Option<Instrument>,
+    /// The parameters of a function of the program, with the values that were found or held.
+    #[serde(default)]
+    own: Option<Vec<(String, f64)>>,
     record: Value,
     notices: Vec<String>,
 }
@@ -40,6 +45,28 @@ const ALSO: [(&str, &str); 2] = [
     ("cook-torrance + blinn-phong", "mixture"),
     ("cook-torrance-ggx + blinn-phong", "mixture-ggx"),
 ];
+
+/// A model as an argument.
+pub(crate) enum ModelLike {
+    Named(String),
+    Function(Py<Material>),
+}
+
+impl<'py> FromPyObject<'_, 'py> for ModelLike {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<ModelLike> {
+        if let Ok(material) = given.cast::<Material>() {
+            return Ok(ModelLike::Function(material.to_owned().unbind()));
+        }
+        let name = given.extract().map(ModelLike::Named);
+        name.map_err(|_| {
+            PyTypeError::new_err(
+                "model is a name, or a matdb.Material of a function with parameters",
+            )
+        })
+    }
+}
 
 /// A curve to fit as an argument.
 pub(crate) enum What {
@@ -75,8 +102,9 @@ impl<'py> FromPyObject<'_, 'py> for What {
 ///     A curve that was measured, a material with a curve or its name, `NAME` or `NAME@REVISION`, or a curve's CSV file.
 /// db : Database, optional
 ///     Where materials are looked for; without it, and for those that it does not have, the built-in ones.
-/// model : str, optional
-///     A model or a material, where the search starts; what the material renders, else `mixture`, unless stated.
+/// model : str or Material, optional
+///     A model or a material, where the search starts; what the material renders, else `mixture`, unless stated. Of a
+///     `Material` of a function the parameters are found; a database cannot keep such a fit.
 /// method : str, default "censored"
 ///     `censored`, `tls`, `tls-tail` (which takes the exponent of the tail as `fixed`) or `mse`.
 /// curve : str, optional
@@ -116,7 +144,7 @@ pub(crate) fn fit(
     py: Python<'_>,
     what: What,
     db: Option<&Database>,
-    model: Option<&str>,
+    model: Option<ModelLike>,
     method: &str,
     curve: Option<&str>,
     columns: Option<&Bound<'_, PyDict>>,
@@ -142,15 +170,21 @@ pub(crate) fn fit(
         held.collect::<PyResult<Vec<(String, f64)>>>()
     })?;
     let columns = columns.map_or(Ok(ColumnNames::default()), column_names)?;
-    let own = |name: &str| ALSO.into_iter().find(|(other, _)| *other == name);
-    let model = model.map(|name| own(name).map_or(name, |(_, own)| own));
+    let own = match &model {
+        Some(ModelLike::Function(material)) => {
+            Some((material.get().name().to_owned(), material.get().law(py)?))
+        }
+        Some(ModelLike::Named(_)) | None => None,
+    };
+    let model = model.as_ref().and_then(ModelLike::name);
     let database = db.map_or_else(|| setup::Database::new(None), Database::database);
-    let fitted = py.detach(|| {
+    let fitted = interruptible(py, |_| {
         // Without a database, one that happens to lie in the working directory is not read.
         let store = db.map(|_| database.read()).transpose()?.flatten();
         let usual = FitRequest::new("");
         let request = FitRequest {
             model,
+            own: own.as_ref().map(|(name, law)| (name.as_str(), law)),
             method,
             curve,
             columns,
@@ -186,13 +220,37 @@ pub(crate) fn fit(
         let FitOutcome { subject, result, fit, refusal, .. } = checked.run(&database)?;
         let mut record = json!(result);
         record["sentences"] = json!(fit.fit.report.as_ref().map(|report| &report.verdict));
-        let fitted = Fit { fit, subject, measured, record, notices };
+        let values = own.as_ref().map(|(_, law)| {
+            let value = |parameter: &OwnParameter| {
+                let name = &parameter.name;
+                let held = result.fit.fixed.iter().find(|(fixed, _)| fixed == name);
+                let found = || result.estimate(name).map(|estimate| estimate.value);
+                let value = held.map(|(_, value)| *value).or_else(found);
+                (name.clone(), value.unwrap_or(parameter.start))
+            };
+            law.parameters().iter().map(value).collect()
+        });
+        let fitted = Fit { fit, subject, measured, own: values, record, notices };
         refusal.map_or(Ok(fitted), Err)
-    });
+    })?;
     fitted.map_err(raised::<Error>)
 }
 
+impl ModelLike {
+    /// Its name, of those of models in papers, too.
+    fn name(&self) -> Option<&str> {
+        let ModelLike::Named(name) = self else { return None };
+        let own = ALSO.into_iter().find(|(other, _)| other == name);
+        Some(own.map_or(name, |(_, own)| own))
+    }
+}
+
 impl Fit {
+    /// Whether it is of a function of the program, which no database can keep.
+    pub(crate) fn is_own(&self) -> bool {
+        self.own.is_some()
+    }
+
     fn report(&self) -> Option<&FitReport> {
         self.fit.fit.report.as_ref()
     }
@@ -210,6 +268,9 @@ impl Fit {
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let values = PyDict::new(py);
+        for (name, value) in self.own.iter().flatten() {
+            values.set_item(name, value)?;
+        }
         for parameter in self.fit.fit.model.parameters() {
             values.set_item(parameter.path, parameter.value)?;
         }

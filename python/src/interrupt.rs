@@ -27,7 +27,8 @@ impl Stop {
     }
 }
 
-/// Does work on another thread while this one looks for signals.
+/// Does work on another thread while this one looks for signals. Where the work calls a function of the program and that
+/// fails, it unwinds with the error.
 pub(crate) fn interruptible<T: Send>(
     py: Python<'_>,
     work: impl FnOnce(&Stop) -> T + Send,
@@ -59,7 +60,11 @@ pub(crate) fn interruptible<T: Send>(
     });
     match (done, signal) {
         (Err(payload), Some(raised)) if payload.is::<Stopped>() => Err(raised),
-        (Err(payload), _) => resume_unwind(payload),
+        // A function of the program that failed inside the work.
+        (Err(payload), _) => match payload.downcast::<PyErr>() {
+            Ok(raised) => Err(*raised),
+            Err(payload) => resume_unwind(payload),
+        },
         // The signal came too late to stop the work, and must not be lost.
         (Ok(_), Some(raised)) => Err(raised),
         (Ok(done), None) => Ok(done),

@@ -9,6 +9,7 @@ mod command;
 mod compare;
 mod database;
 mod diagnose;
+mod effect;
 mod error;
 mod fit;
 mod interrupt;
@@ -36,6 +37,8 @@ mod _matdb {
     use crate::database::{Database, open, verify};
     #[pymodule_export]
     use crate::diagnose::{Diagnosis, diagnose, effects};
+    #[pymodule_export]
+    use crate::effect::{Effect, Shots};
     #[pymodule_export]
     use crate::error::{
         CatalogueError, CloudError, DiagnoseError, Error, FileError, FitError, MaterialError,

@@ -1,12 +1,18 @@
 //! A material.
 
+use std::panic::resume_unwind;
+use std::path::PathBuf;
+
 use matdb::brdf::{Brdf, Scattering};
-use matdb::material::{MaterialError, SampledMaterial, Slug};
+use matdb::files::{folder_of, write_all};
+use matdb::fit::{OwnLaw, OwnParameter};
+use matdb::material::{MaterialError, SampledMaterial, Slug, file};
 use matdb::setup::MaterialRevision;
 use matdb::units::db_from_ratio;
 use numpy::{PyArray1, PyArrayLike1};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{PyDict, PyTuple};
 
 use crate::error::{UsageError, raised, warn};
 use crate::json::{of_text, text_of, to_python};
@@ -22,7 +28,9 @@ use crate::json::{of_text, text_of, to_python};
 /// name : str
 ///     Short name: small letters, digits and hyphens.
 /// sigma0_db : callable
-///     Takes an array of angles of incidence, degrees, and gives sigma0 at each, dB.
+///     Takes an array of angles of incidence, degrees, and the parameters by name, and gives sigma0 at each angle, dB.
+/// parameters : dict of str to tuple, optional
+///     Free numbers of the function, `(start, low, high)`: the material has those of the start, and `fit` finds others.
 ///
 /// Warns
 /// -----
@@ -32,6 +40,8 @@ use crate::json::{of_text, text_of, to_python};
 pub(crate) struct Material {
     found: MaterialRevision,
     sampling_error_db: Option<f64>,
+    /// The function with its parameters.
+    function: Option<(Py<PyAny>, Vec<OwnParameter>)>,
 }
 
 /// Why a function is no material.
@@ -48,11 +58,34 @@ impl From<MaterialError> for Refused {
 
 impl Material {
     pub(crate) fn new(found: MaterialRevision) -> Material {
-        Material { found, sampling_error_db: None }
+        Material { found, sampling_error_db: None, function: None }
     }
 
     pub(crate) fn found(&self) -> &MaterialRevision {
         &self.found
+    }
+
+    /// The law of its function, of which `fit` finds the parameters. Where the function fails, the work that calls it unwinds
+    /// with the error.
+    pub(crate) fn law(&self, py: Python<'_>) -> PyResult<OwnLaw> {
+        let Some((function, parameters)) =
+            self.function.as_ref().filter(|(_, own)| !own.is_empty())
+        else {
+            return Err(UsageError::new_err(format!(
+                "{} has no parameters to fit; give it some, as in Material(name, function, parameters={{\"m\": (0.1, 0.01, 1)}}), or \
+                 name a model",
+                self.name()
+            )));
+        };
+        let (function, own) = (function.clone_ref(py), parameters.clone());
+        let law = OwnLaw::new(parameters.clone(), move |values, angles_deg| {
+            let levels_db = Python::attach(|py| {
+                let named = named(py, &own, values)?;
+                levels_db(function.bind(py), &named, angles_deg)
+            });
+            levels_db.unwrap_or_else(|raised| resume_unwind(Box::new(raised)))
+        });
+        law.map_err(|error| UsageError::new_err(error.to_string()))
     }
 }
 
@@ -68,11 +101,59 @@ pub(crate) fn sigma0_db<'py>(
     PyArray1::from_iter(py, levels_db)
 }
 
+/// Values of parameters by name.
+fn named<'py>(
+    py: Python<'py>,
+    parameters: &[OwnParameter],
+    values: &[f64],
+) -> PyResult<Bound<'py, PyDict>> {
+    let named = PyDict::new(py);
+    for (parameter, value) in parameters.iter().zip(values) {
+        named.set_item(&parameter.name, value)?;
+    }
+    Ok(named)
+}
+
+/// A parameter with its start and its range.
+fn parameter(name: String, given: &Bound<'_, PyAny>) -> PyResult<OwnParameter> {
+    let numbers = given
+        .extract::<(f64, f64, f64)>()
+        .map_err(|_| PyTypeError::new_err(format!("parameters[{name:?}] is (start, low, high)")));
+    let (start, min, max) = numbers?;
+    if name == "looks" {
+        let problem =
+            "`looks` are those of the speckle, which a fit finds by itself; take another name";
+        return Err(UsageError::new_err(problem));
+    }
+    Ok(OwnParameter { name, min, max, start })
+}
+
+/// The parameters of a function.
+fn own_parameters(given: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<OwnParameter>> {
+    let given = given.into_iter().flatten();
+    let own = given.map(|(name, range)| parameter(name.extract()?, &range));
+    let own = own.collect::<PyResult<Vec<OwnParameter>>>()?;
+    // Refuses empty ranges, and starts outside.
+    let law = OwnLaw::new(own.clone(), |_, _| Vec::new());
+    law.map(|_| own).map_err(|error| UsageError::new_err(error.to_string()))
+}
+
+/// The file of a material with the law alone that scenes render of it.
+pub(crate) fn law_file(material: &matdb::material::Material) -> PyResult<Vec<u8>> {
+    let alone = material.with_law_alone().map_err(raised)?;
+    let text = file::write(&alone).map_err(|error| UsageError::new_err(error.to_string()))?;
+    Ok(text.into_bytes())
+}
+
 /// The levels that a function gives at some angles. One number stands for all.
-fn levels_db(function: &Bound<'_, PyAny>, angles_deg: &[f64]) -> PyResult<Vec<f64>> {
+fn levels_db(
+    function: &Bound<'_, PyAny>,
+    named: &Bound<'_, PyDict>,
+    angles_deg: &[f64],
+) -> PyResult<Vec<f64>> {
     let py = function.py();
     let numpy = py.import("numpy")?;
-    let levels_db = function.call1((PyArray1::from_slice(py, angles_deg),))?;
+    let levels_db = function.call((PyArray1::from_slice(py, angles_deg),), Some(named))?;
     let levels_db = numpy.call_method1("asarray", (levels_db, "float64"))?;
     let levels_db = numpy.call_method1("broadcast_to", (levels_db, angles_deg.len()))?;
     levels_db.call_method0("tolist")?.extract()
@@ -81,10 +162,19 @@ fn levels_db(function: &Bound<'_, PyAny>, angles_deg: &[f64]) -> PyResult<Vec<f6
 #[pymethods]
 impl Material {
     #[new]
-    fn of_function(py: Python<'_>, name: &str, sigma0_db: &Bound<'_, PyAny>) -> PyResult<Material> {
+    #[pyo3(signature = (name, sigma0_db, *, parameters = None))]
+    fn of_function(
+        py: Python<'_>,
+        name: &str,
+        sigma0_db: &Bound<'_, PyAny>,
+        parameters: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Material> {
+        let own = own_parameters(parameters)?;
+        let starts: Vec<f64> = own.iter().map(|parameter| parameter.start).collect();
+        let start = named(py, &own, &starts)?;
         let slug: Slug = name.parse().map_err(|problem: String| UsageError::new_err(problem))?;
         let sampled = SampledMaterial::new(slug, |angles_deg| {
-            levels_db(sigma0_db, angles_deg).map_err(Refused::ByPython)
+            levels_db(sigma0_db, &start, angles_deg).map_err(Refused::ByPython)
         });
         let sampled = sampled.map_err(|refused| match refused {
             Refused::ByPython(error) => error,
@@ -99,7 +189,8 @@ impl Material {
             warn(py, &[notice])?;
         }
         let found = MaterialRevision { material, revision: None };
-        Ok(Material { found, sampling_error_db: Some(error_db) })
+        let function = Some((sigma0_db.clone().unbind(), own));
+        Ok(Material { found, sampling_error_db: Some(error_db), function })
     }
 
     /// How far the curve of a function is off midway between its samples, dB; None for other materials.
@@ -110,7 +201,7 @@ impl Material {
 
     /// Short name.
     #[getter]
-    fn name(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         self.found.material.slug.as_str()
     }
 
@@ -185,13 +276,40 @@ impl Material {
 
     /// A material of its text, as pickle makes one.
     #[staticmethod]
-    fn _of_text(text: &str, sampling_error_db: Option<f64>) -> PyResult<Material> {
-        Ok(Material { found: of_text(text)?, sampling_error_db })
+    fn _of_text(
+        text: &str,
+        sampling_error_db: Option<f64>,
+        function: Option<(Py<PyAny>, Bound<'_, PyDict>)>,
+    ) -> PyResult<Material> {
+        let function = match function {
+            None => None,
+            Some((function, parameters)) => Some((function, own_parameters(Some(&parameters))?)),
+        };
+        Ok(Material { found: of_text(text)?, sampling_error_db, function })
+    }
+
+    /// Writes the law that scenes render as a file, which `Database.add` and `matdb add` take.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let bytes = law_file(&self.found.material)?;
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        py.detach(|| write_all(folder_of(&path), &[(name, bytes)])).map_err(raised)
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
-        let Material { found, sampling_error_db } = slf.get();
-        let parts = (text_of(found)?, *sampling_error_db);
+        let Material { found, sampling_error_db, function } = slf.get();
+        // A function without parameters is in the samples, and many cannot be pickled.
+        let function = function.as_ref().filter(|(_, own)| !own.is_empty());
+        let function = match function {
+            None => None,
+            Some((function, own)) => {
+                let parameters = PyDict::new(slf.py());
+                for OwnParameter { name, min, max, start } in own {
+                    parameters.set_item(name, (start, min, max))?;
+                }
+                Some((function, parameters))
+            }
+        };
+        let parts = (text_of(found)?, *sampling_error_db, function);
         (slf.get_type().getattr("_of_text")?, parts).into_pyobject(slf.py())
     }
 

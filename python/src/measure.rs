@@ -194,7 +194,7 @@ impl Measurement {
     #[pyo3(signature = (model = None, **settings))]
     fn fit<'py>(
         slf: &Bound<'py, Self>,
-        model: Option<&str>,
+        model: Option<Bound<'py, PyAny>>,
         settings: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let py = slf.py();

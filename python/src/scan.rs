@@ -131,9 +131,11 @@ pub(crate) fn render(
         scene = Py::new(py, scene.get().with(py, &changes)?)?;
     }
     let own = scene.get();
+    let effects = own.own_effects(py)?;
     let rendered = interruptible(py, |stop| {
         let store = db.map_or(Ok(None), Database::read)?;
         let ready = ReadyScene::new(own.scene().clone(), own.path(), store.as_ref())?;
+        let ready = ready.with_own_effects(effects);
         drop(store);
         let gpu = match (tracer == Some("gpu")).then(Gpu::new).transpose() {
             Err(GpuError::NoAdapter { .. }) => None,

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::DVec3;
+use matdb::effects::EffectList;
 use matdb::files::{folder_of, write_all};
 use matdb::formats::ply::write_mesh;
 use matdb::geometry::Mesh;
-use matdb::material::file;
 use matdb::scene::{self, GivenMaterials, GivenMeshes, SceneFile, read_text};
 use numpy::{AllowTypeChange, PyArray1, PyArrayLike2, PyArrayMethods};
 use pyo3::exceptions::PyTypeError;
@@ -15,9 +15,10 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyString, PyTuple};
 use toml::{Table, Value};
 
+use crate::effect::Effect;
 use crate::error::{UsageError, no_choice, raised};
 use crate::json::{of_text, text_of, to_python};
-use crate::material::Material;
+use crate::material::{Material, law_file};
 
 /// Radar, scan and target. It never changes; `replace` makes another.
 ///
@@ -46,6 +47,8 @@ pub(crate) struct Scene {
     scene: scene::Scene,
     /// Meshes that are in no file.
     given: Arc<GivenMeshes>,
+    /// Effects of the program's own, with the values of their parameters by name.
+    effects: Vec<(Py<Effect>, Py<PyDict>)>,
 }
 
 /// Where the file of a scene would be that is in no file.
@@ -64,7 +67,7 @@ impl Scene {
         let file = parse(&text, path)?;
         let scene = scene::Scene::resolve_given(file, path, &given)?;
         let scene = scene::Scene { given: materials, ..scene };
-        Ok(Scene { text, path: path.to_owned(), scene, given })
+        Ok(Scene { text, path: path.to_owned(), scene, given, effects: Vec::new() })
     }
 
     /// This scene with another text. Its meshes are loaded only where the text says other things of meshes or regions.
@@ -74,12 +77,13 @@ impl Scene {
         text: String,
         materials: GivenMaterials,
     ) -> PyResult<Scene> {
-        let made = py.detach(|| -> Result<Scene, matdb::error::Error> {
+        let made = py.detach(|| -> Result<scene::Scene, matdb::error::Error> {
             let scene = self.scene.replace(parse(&text, &self.path)?, &self.path, &self.given)?;
-            let scene = scene::Scene { given: materials, ..scene };
-            Ok(Scene { text, path: self.path.clone(), scene, given: self.given.clone() })
+            Ok(scene::Scene { given: materials, ..scene })
         });
-        made.map_err(raised)
+        let scene = made.map_err(raised)?;
+        let (path, given) = (self.path.clone(), self.given.clone());
+        Ok(Scene { text, path, scene, given, effects: self.effects_again(py) })
     }
 
     fn table(&self) -> PyResult<Table> {
@@ -111,6 +115,17 @@ impl Scene {
 
     pub(crate) fn name(&self) -> &str {
         &self.scene.file.name
+    }
+
+    fn effects_again(&self, py: Python<'_>) -> Vec<(Py<Effect>, Py<PyDict>)> {
+        let effects = self.effects.iter();
+        effects.map(|(effect, values)| (effect.clone_ref(py), values.clone_ref(py))).collect()
+    }
+
+    /// Its effects of the program's own.
+    pub(crate) fn own_effects(&self, py: Python<'_>) -> PyResult<EffectList> {
+        let effects = self.effects.iter();
+        effects.map(|(effect, values)| effect.get().with_values(values.bind(py))).collect()
     }
 
     pub(crate) fn chirps(&self) -> usize {
@@ -268,6 +283,35 @@ impl Scene {
         self.with_text(py, table.to_string(), own)
     }
 
+    /// This scene with effects of one's own, beside those of its file. `render`, `compare` and `diagnose` apply them; no file of
+    /// the scene says them.
+    ///
+    /// Parameters
+    /// ----------
+    /// effects : dict of Effect to dict of str to float
+    ///     The values of the parameters of each; those that are not named are absent.
+    fn with_effects(&self, py: Python<'_>, effects: &Bound<'_, PyDict>) -> PyResult<Scene> {
+        let mut own: Vec<(Py<Effect>, Py<PyDict>)> = Vec::new();
+        for (effect, values) in effects {
+            let effect = effect.cast::<Effect>().map_err(|_| {
+                PyTypeError::new_err(
+                    "with_effects takes {effect: {parameter: value}} of matdb.Effect",
+                )
+            })?;
+            let values = values.cast::<PyDict>()?.copy()?;
+            effect.get().with_values(&values)?;
+            if own.iter().any(|(other, _)| other.get().name() == effect.get().name()) {
+                let problem = format!("two effects are called {}", effect.get().name());
+                return Err(UsageError::new_err(format!("{problem}; give one another name")));
+            }
+            own.push((effect.clone().unbind(), values.unbind()));
+        }
+        Ok(Scene {
+            effects: own,
+            ..self.with_text(py, self.text.clone(), self.scene.given.clone())?
+        })
+    }
+
     fn __repr__(&self) -> String {
         let facets = self.scene.target.mesh.facets.len();
         format!("<matdb.Scene {}: {} chirps, {facets} facets>", self.name(), self.chirps())
@@ -287,9 +331,7 @@ impl Scene {
         }
         for (key, material) in &self.scene.given {
             let name = &material.slug;
-            let file = file::write(&material.with_law_alone().map_err(raised)?)
-                .map_err(|error| UsageError::new_err(error.to_string()))?;
-            files.push((format!("material-{name}.toml"), file.into_bytes()));
+            files.push((format!("material-{name}.toml"), law_file(material)?));
             for entry in entries(&mut table, "region") {
                 if entry.get("material").and_then(Value::as_str) == Some(key) {
                     entry["material"] = name.as_str().into();
@@ -309,13 +351,15 @@ impl Scene {
         path: PathBuf,
         given: &Bound<'_, PyDict>,
         materials: &str,
+        effects: Vec<(Py<Effect>, Py<PyDict>)>,
     ) -> PyResult<Scene> {
         let mut meshes = GivenMeshes::new();
         for (name, mesh) in given {
             meshes.insert(name.extract()?, mesh_of(&mesh)?);
         }
         let materials = of_text(materials)?;
-        py.detach(|| Scene::of_text(text, &path, Arc::new(meshes), materials)).map_err(raised)
+        let made = py.detach(|| Scene::of_text(text, &path, Arc::new(meshes), materials));
+        Ok(Scene { effects, ..made.map_err(raised)? })
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
@@ -327,7 +371,8 @@ impl Scene {
             let facets = PyArray1::from_iter(py, mesh.facets.iter().flatten().copied());
             given.set_item(name, (vertices, facets.reshape([mesh.facets.len(), 3])?))?;
         }
-        let parts = (&own.text, &own.path, given, text_of(&own.scene.given)?);
+        let materials = text_of(&own.scene.given)?;
+        let parts = (&own.text, &own.path, given, materials, own.effects_again(py));
         (slf.get_type().getattr("_of_parts")?, parts).into_pyobject(py)
     }
 }

@@ -40,6 +40,8 @@ pub struct CloudRequest<'a> {
     pub receiver: Option<&'a str>,
     /// Effects to try; all for an empty list.
     pub effects: &'a [&'static dyn Effect],
+    /// Effects of a program's own, which are tried as well. No file can declare them.
+    pub own_effects: &'a [&'static dyn Effect],
     /// The material that alone receives what is found; all of the scene for `None`.
     pub material: Option<&'a str>,
     /// Seed of everything random.
@@ -153,6 +155,12 @@ impl<'a> CloudRequest<'a> {
         let further = further.collect::<Result<Vec<_>, _>>()?;
         self.check_together(&ready, &further)?;
         let recipient = self.material.map(|name| find_recipient(&ready, name)).transpose()?;
+        if self.add && !self.own_effects.is_empty() {
+            return Err(Error::usage(
+                "effects of a program's own cannot be stored",
+                "diagnose without storing, or without them",
+            ));
+        }
         if self.add {
             check_beside(self.scene)?;
             further.iter().try_for_each(|scene| check_beside(&scene.path))?;
@@ -261,8 +269,9 @@ impl<'a> CloudRequest<'a> {
             measured.with_bounce |= scene.file.bounce.is_some();
             measured.with_sheets |= scene.target.transmits();
         }
-        let asked =
+        let mut asked =
             if self.effects.is_empty() { library().to_vec() } else { self.effects.to_vec() };
+        asked.extend(self.own_effects);
         let choice = Choice::new(&asked, &declared, measured);
         if !self.effects.is_empty() {
             type Refusal = (Reason, fn(String) -> DiagnoseError);
@@ -331,6 +340,14 @@ impl CheckedRequest<'_> {
         }
         if let Some(name) = self.request.receiver {
             notices.push(format!("the cloud is that of receiver `{name}`"));
+        }
+        if !self.request.own_effects.is_empty() {
+            let names: Vec<&str> =
+                self.request.own_effects.iter().map(|effect| effect.name()).collect();
+            notices.push(format!(
+                "effects of a program's own were tried as well, which no file can declare: {}",
+                names.join(", ")
+            ));
         }
         if self.ready.scene.radar().speckle.is_none() {
             notices.push(NO_SPECKLE.to_owned());

@@ -56,12 +56,13 @@ pub(super) fn of_own_echoes(found: &[FoundEffect]) -> Vec<&'static str> {
     found.iter().map(|one| one.name).filter(|name| is_own(name)).collect()
 }
 
-/// The effects of a level that were found, as entries of a file.
+/// The effects of a level that were found, as entries of a file; without those of a program's own, which no file can declare.
 pub(super) fn entries(
     found: &[FoundEffect],
     level: Level,
 ) -> impl Iterator<Item = EffectEntry> + '_ {
-    found.iter().filter(move |one| one.level == level).map(|one| EffectEntry {
+    let is_known = move |one: &&FoundEffect| one.level == level && find(one.name).is_some();
+    found.iter().filter(is_known).map(|one| EffectEntry {
         name: one.name.to_owned(),
         source: None,
         parameters: one.parameters.iter().map(|(k, v)| ((*k).to_owned(), v.value)).collect(),

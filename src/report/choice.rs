@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::diagnose::curve::{Term, terms};
-use crate::effects::{Effect, Setting, library};
+use crate::effects::{Effect, Setting, find, library};
 
 /// Why an effect is not tried.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -97,13 +97,15 @@ pub struct Choice {
 }
 
 impl Choice {
-    /// Sorts the effects that were asked for; `declared` names those at work in the scene already.
+    /// Sorts the effects that were asked for, of the library or a program's own; `declared` names those at work in the scene
+    /// already.
     pub fn new(asked: &[&'static dyn Effect], declared: &[&str], measured: Measurands) -> Choice {
         let mut choice = Choice { tried: Vec::new(), not_tried: Vec::new() };
-        for effect in library() {
+        let is_own = |effect: &&&'static dyn Effect| find(effect.name()).is_none();
+        for effect in library().iter().chain(asked.iter().filter(is_own)) {
             let name = effect.name();
             let is_asked = asked.iter().any(|other| other.name() == name);
-            if let Some(reason) = reason_against(effect, is_asked, declared, measured) {
+            if let Some(reason) = reason_against(*effect, is_asked, declared, measured) {
                 choice.not_tried.push(UntriedEffect { name, reason });
             }
         }
@@ -184,7 +186,6 @@ pub fn terms_not_asked(asked: &[&'static dyn Term]) -> Vec<UntriedEffect> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::find;
 
     #[test]
     fn every_effect_is_tried_or_has_a_reason() {

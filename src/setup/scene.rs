@@ -50,6 +50,8 @@ pub struct ReadyScene {
     pub effects: SceneEffects,
     /// For every region the sheet that it is; `None` where nothing passes.
     pub sheets: Vec<Option<Sheet>>,
+    /// Names of the effects of a program's own.
+    own_effects: Vec<&'static str>,
 }
 
 /// What [`Setup`] borrows besides the scene: the hierarchy over the mesh, a surface per region and the
@@ -100,9 +102,18 @@ impl ReadyScene {
         let effects = find_effects(&scene, path, &materials, &material_of_region)?;
         let sheets = Vec::new();
         let path = path.to_owned();
-        let mut ready = ReadyScene { scene, path, materials, material_of_region, effects, sheets };
+        let own_effects = Vec::new();
+        let mut ready =
+            ReadyScene { scene, path, materials, material_of_region, effects, sheets, own_effects };
         ready.sheets = ready.find_sheets()?;
         Ok(ready)
+    }
+
+    /// The same with effects of a program's own on the whole scan, which no file can declare.
+    pub fn with_own_effects(mut self, effects: EffectList) -> ReadyScene {
+        self.own_effects.extend(effects.iter().map(|(effect, _)| effect.name()));
+        self.effects.add(effects);
+        self
     }
 
     /// As [`open`](Self::open), of a scene that renders the mean power of its radar, without receiver, speckle and
@@ -294,6 +305,11 @@ impl ReadyScene {
             notices.extend(self.beyond_beam(material));
         }
         notices.extend(self.gaining_sheets());
+        if !self.own_effects.is_empty() {
+            let names = self.own_effects.join(", ");
+            notices
+                .push(format!("effects of a program's own act that no file can declare: {names}"));
+        }
         notices
     }
 

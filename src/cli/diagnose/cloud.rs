@@ -38,6 +38,7 @@ pub(super) fn run(
         further: &further,
         receiver: args.receiver.as_deref(),
         effects: &effects,
+        own_effects: &[],
         material: args.material.as_deref(),
         seed: args.seed,
         controls: !args.no_controls,

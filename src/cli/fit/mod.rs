@@ -174,6 +174,7 @@ fn request(args: &Args) -> Result<FitRequest<'_>, Error> {
         curve: args.curve.as_deref(),
         columns: args.columns.names(),
         model: args.model.as_deref(),
+        own: None,
         method: args.method.into(),
         alpha: args.alpha,
         fixed: args.fixed.iter().map(|text| held(text)).collect::<Result<_, _>>()?,
