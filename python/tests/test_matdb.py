@@ -937,6 +937,131 @@ def test_a_function_is_a_base_model_of_a_diagnosis():
     assert [effect["name"] for effect in why.effects] == ["foreign-patch"]
 
 
+def sideways(shots, slope_db):
+    return slope_db * shots.xt_m / 0.2
+
+
+def test_an_effect_of_a_function_is_rendered_and_found(tmp_path):
+    bench = md.load_scene("builtin:bench")
+    own = md.Effect("sideways", sideways, {"slope_db": (-20, 20)}, level="instrument")
+    assert repr(own) == "<matdb.Effect sideways(slope_db)>"
+    places_m = {}
+
+    def watched(shots, slope_db):
+        places_m.update(zip(shots.chirp.tolist(), shots.xt_m.tolist()))
+        return sideways(shots, slope_db)
+
+    watched = md.Effect("watched", watched, {"slope_db": (-20, 20)}, level="instrument")
+    with_it, without = md.render(bench.with_effects({watched: {"slope_db": 6}})), md.render(bench)
+    assert any("no file can declare: watched" in notice for notice in with_it.notices) and without.notices != with_it.notices
+    powers_dbm = [dict(zip(one.cloud["chirp"].tolist(), one.points_dbm.tolist())) for one in (with_it, without)]
+    both = powers_dbm[0].keys() & powers_dbm[1].keys()
+    gains_db = [powers_dbm[0][chirp] - powers_dbm[1][chirp] for chirp in both]
+    # The noise of the receiver is no part of the echo.
+    errors_db = np.subtract(gains_db, [6 * places_m[chirp] / 0.2 for chirp in both])
+    assert len(both) > 1000 and np.quantile(np.abs(errors_db), 0.9) < 0.05
+    scan = md.render(bench.with_effects({own: {"slope_db": 6}}))
+    compared = [md.compare(scan, one) for one in (bench.with_effects({own: {"slope_db": 6}}), bench)]
+    scatter_db = [np.nanstd(one.simulated_dbm - one.measured_dbm) for one in compared]
+    assert scatter_db[0] < scatter_db[1] - 0.3, scatter_db
+    again = pickle.loads(pickle.dumps(bench.with_effects({own: {"slope_db": 6}})))
+    assert md.render(again).file("cloud.ply") == scan.file("cloud.ply") != md.render(bench).file("cloud.ply")
+    why = md.diagnose(scan, bench, effects=["foreign-patch", "drift"], own_effects=[own], controls=False)
+    assert why.verdict == "explained" and [effect["name"] for effect in why.effects] == ["sideways"]
+    found = why.effects[0]["parameters"]["slope_db"]
+    assert abs(found["value"] - 6) < 3 * found["sd"] < 3
+    why.save(tmp_path)
+    assert "sideways" not in (tmp_path / "after.toml").read_text()
+    assert "no file can declare: sideways" in (tmp_path / "report.html").read_text()
+
+
+def test_an_effect_of_a_function_is_checked():
+    bench = md.load_scene("builtin:bench")
+    for name, function, parameters, options, said in [
+        ("drift", sideways, {"slope_db": (-1, 1)}, {}, "the library has an effect `drift`"),
+        ("Side Ways", sideways, {"slope_db": (-1, 1)}, {}, "is not a material name|is not a name"),
+        ("own", sideways, {}, {}, "at least one parameter"),
+        ("own", sideways, {"slope_db": (1, -1)}, {}, "is no range"),
+        ("own", sideways, {"slope_db": (1, 2)}, {}, "with the value 0 at which the effect is absent"),
+        ("own", sideways, {"slope_db": (1,)}, {}, "has 1 numbers"),
+        ("own", sideways, {"slope db": (-1, 1)}, {}, "no name of an argument"),
+        ("own", sideways, {"slope_db": (-1, 1)}, {"level": "sky"}, "give instrument, material or scene"),
+        ("own", sideways, {"slope_db": (-1, 1)}, {"starts": [{"slope": 1}]}, "give slope_db"),
+        ("own", sideways, {"slope_db": (-1, 1)}, {"starts": [{"slope_db": 2}]}, "out of range; give a value from -1 to 1"),
+    ]:
+        with pytest.raises(md.UsageError, match=said):
+            md.Effect(name, function, parameters, **options)
+    with pytest.raises(TypeError, match="is a function"):
+        md.Effect("own", 3, {"slope_db": (-1, 1)})
+
+    def of(function):
+        return md.Effect("own", function, {"slope_db": (-20, 20)})
+
+    for function, kind, said in [
+        (lambda shots, slope_db: 1 / 0, ZeroDivisionError, "division"),
+        (lambda shots, slope_db: np.nan, md.UsageError, "effect `own` gives NaN"),
+        (lambda shots, slope_db: np.zeros(len(shots) + 1), md.UsageError, "gives .* gains for .* chirps"),
+        (lambda shots: 0.0, TypeError, "slope_db"),
+    ]:
+        with pytest.raises(kind, match=said):
+            md.render(bench.with_effects({of(function): {}}))
+        with pytest.raises(kind, match=said):
+            md.diagnose(md.render(bench), bench, own_effects=[of(function)], effects=["drift"], controls=False)
+    with pytest.raises(md.UsageError, match="two effects are called own"):
+        bench.with_effects({of(sideways): {}, of(sideways): {}})
+    with pytest.raises(md.UsageError, match="slope_db = 30.* out of range"):
+        bench.with_effects({of(sideways): {"slope_db": 30}})
+
+
+def lobe(theta_deg, r_s, alpha):
+    return 10 * (np.log10(2 * r_s * (alpha + 2)) + (alpha + 2) * np.log10(np.cos(np.radians(theta_deg))))
+
+
+def test_the_parameters_of_a_function_are_fitted(scene, tmp_path):
+    curve = md.measure(md.render(md.load_scene("builtin:bench")), "builtin:bench")
+    own = md.Material("own-lobe", lobe, parameters={"r_s": (0.1, 1e-4, 1), "alpha": (20, 0.1, 1000)})
+    assert np.allclose(own.sigma0_db([10]), lobe(10, 0.1, 20), atol=0.02)
+    found = curve.fit(pickle.loads(pickle.dumps(own)))
+    known = curve.fit("blinn-phong")
+    assert found.name == "own-lobe-censored" and found.names == ["r_s", "alpha", "looks"]
+    assert abs(found.to_dict()["objective"] - known.to_dict()["objective"]) < 0.01
+    for name in ["r_s", "alpha"]:
+        assert found.parameters[name] == pytest.approx(known.parameters[name], rel=1e-3)
+    assert pickle.loads(pickle.dumps(found)).parameters == found.parameters
+    held = md.fit(curve, model=own, fixed={"alpha": 5})
+    assert held.parameters["alpha"] == 5 and held.names == ["r_s", "looks"]
+    assert np.allclose(held.sigma0_db([10, 40]), lobe(np.array([10, 40]), held.parameters["r_s"], 5), atol=0.02)
+    db = md.open("own.sqlite")
+    with pytest.raises(md.UsageError, match="cannot be stored; save a Material"):
+        db.add("mine", found)
+    # The way that this names.
+    best = md.Material("mine", lambda theta_deg: lobe(theta_deg, **found.parameters))
+    best.save(tmp_path / "mine.toml")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        assert db.add(files=[tmp_path / "mine.toml"]) == ["mine@1"]
+    assert np.allclose(db["mine"].sigma0_db([10, 40]), found.sigma0_db([10, 40]), atol=0.02)
+    with pytest.raises(md.UsageError, match="no parameters to fit"):
+        curve.fit(best)
+    with pytest.raises(md.UsageError, match="no parameter `beta`.* there are: r_s, alpha"):
+        curve.fit(own, fixed={"beta": 1})
+    with pytest.raises(md.UsageError, match="m = 2 is out of range; give a value from 0 to 1"):
+        md.Material("own", lambda theta_deg, m: -m, parameters={"m": (2, 0, 1)})
+    with pytest.raises(TypeError, match="is .start, low, high."):
+        md.Material("own", lambda theta_deg, m: -m, parameters={"m": (2, 0)})
+
+    calls = []
+
+    def failing(theta_deg, m):
+        calls.append(m)
+        if len(calls) > 20:
+            raise ZeroDivisionError
+        return -m * np.ones_like(theta_deg)
+
+    with pytest.raises(ZeroDivisionError):
+        curve.fit(md.Material("own", failing, parameters={"m": (10, 0, 100)}))
+
+
 def test_what_is_missing_is_said(scene, monkeypatch):
     scan = md.render(scene)
     for package, call in [("open3d", scan.to_open3d), ("rerun", scan.to_rerun), ("pyarrow", scan.cloud.to_arrow)]:
