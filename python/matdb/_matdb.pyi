@@ -16,6 +16,7 @@ __all__ = [
     "Database",
     "DiagnoseError",
     "Diagnosis",
+    "Effect",
     "Error",
     "FileError",
     "Fit",
@@ -28,6 +29,7 @@ __all__ = [
     "Scan",
     "Scene",
     "SceneError",
+    "Shots",
     "StoreError",
     "Table",
     "UsageError",
@@ -70,7 +72,13 @@ class CatalogueError(Error): ...
 
 @final
 class Material:
-    def __new__(cls, name: str, sigma0_db: Callable[[NDArray[np.float64]], ArrayLike]) -> Material: ...
+    def __new__(
+        cls,
+        name: str,
+        sigma0_db: Callable[..., ArrayLike],
+        *,
+        parameters: Mapping[str, tuple[float, float, float]] | None = None,
+    ) -> Material: ...
     @property
     def sampling_error_db(self) -> float | None: ...
     @property
@@ -90,8 +98,12 @@ class Material:
     def sigma0_db(self, theta_deg: ArrayLike) -> NDArray[np.float64]: ...
     def plot(self, ax: Any = None) -> Any: ...
     def to_dict(self) -> _Record: ...
+    def at(self, **parameters: float) -> Material: ...
+    def save(self, path: _Name) -> None: ...
     @staticmethod
-    def _of_text(text: str, sampling_error_db: float | None) -> Material: ...
+    def _of_text(
+        text: str, sampling_error_db: float | None, function: tuple[Callable[..., ArrayLike], dict[str, Any]] | None
+    ) -> Material: ...
 
 @final
 class Database:
@@ -209,7 +221,7 @@ def fit(
     what: Measurement | Material | _Name,
     *,
     db: Database | None = None,
-    model: str | None = None,
+    model: str | Material | None = None,
     method: str = "censored",
     curve: str | None = None,
     columns: Mapping[str, str] | None = None,
@@ -247,9 +259,12 @@ class Scene:
     def to_dict(self) -> _Record: ...
     def replace(self, **changes: Any) -> Scene: ...
     def with_materials(self, materials: Mapping[str, str | Material]) -> Scene: ...
+    def with_effects(self, effects: Mapping[Effect, Mapping[str, float]]) -> Scene: ...
     def save(self, path: _Name) -> None: ...
     @staticmethod
-    def _of_parts(text: str, path: _Name, given: dict[str, Any], materials: str) -> Scene: ...
+    def _of_parts(
+        text: str, path: _Name, given: dict[str, Any], materials: str, effects: list[tuple[Effect, dict[str, float]]]
+    ) -> Scene: ...
 
 def load_scene(path: _Name) -> Scene: ...
 
@@ -269,7 +284,7 @@ class Measurement:
     def notices(self) -> list[str]: ...
     def fit(
         self,
-        model: str | None = None,
+        model: str | Material | None = None,
         *,
         db: Database | None = None,
         method: str = "censored",
@@ -459,6 +474,58 @@ def calibrate(
 ) -> _Record: ...
 
 @final
+class Shots:
+    @property
+    def chirp(self) -> NDArray[np.uint32]: ...
+    @property
+    def time_s(self) -> NDArray[np.float64]: ...
+    @property
+    def progress(self) -> NDArray[np.float64]: ...
+    @property
+    def xt_m(self) -> NDArray[np.float64]: ...
+    @property
+    def yt_m(self) -> NDArray[np.float64]: ...
+    @property
+    def x_m(self) -> NDArray[np.float64]: ...
+    @property
+    def y_m(self) -> NDArray[np.float64]: ...
+    @property
+    def z_m(self) -> NDArray[np.float64]: ...
+    @property
+    def range_m(self) -> NDArray[np.float64]: ...
+    @property
+    def theta_deg(self) -> NDArray[np.float64]: ...
+    @property
+    def region(self) -> NDArray[np.uint16]: ...
+    def __len__(self) -> int: ...
+
+@final
+class Effect:
+    def __new__(
+        cls,
+        name: str,
+        gain_db: Callable[..., ArrayLike],
+        parameters: Mapping[str, tuple[float, ...]],
+        *,
+        level: str = "scene",
+        description: str | None = None,
+        starts: Sequence[Mapping[str, float]] | None = None,
+        uses_time: bool = False,
+    ) -> Effect: ...
+    @property
+    def name(self) -> str: ...
+    @staticmethod
+    def _of_parts(
+        name: str,
+        gain_db: Callable[..., ArrayLike],
+        parameters: dict[str, Any],
+        level: str,
+        description: str,
+        starts: list[dict[str, float]],
+        uses_time: bool,
+    ) -> Effect: ...
+
+@final
 class Diagnosis:
     @property
     def verdict(self) -> str: ...
@@ -487,6 +554,7 @@ def diagnose(
     db: Database | None = None,
     receiver: str | None = None,
     effects: Sequence[str] = ...,
+    own_effects: Sequence[Effect] = ...,
     seed: int = 0,
     controls: bool = True,
 ) -> Diagnosis: ...

@@ -71,8 +71,8 @@ impl Database {
         keep_render: bool,
     ) -> PyResult<Vec<String>> {
         if fit.is_own() {
-            let problem = "a fit of a function of a program cannot be stored; save a Material of the function with the \
-                           parameters of the fit, and add that file";
+            let problem = "a fit of a function of a program cannot be stored; save the Material at the parameters of \
+                           the fit, material.at(**fit.parameters).save(path), and add that file";
             return Err(UsageError::new_err(problem));
         }
         let slug = name.parse::<Slug>();

@@ -14,7 +14,7 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
-use crate::error::{UsageError, raised, warn};
+use crate::error::{UsageError, no_choice, raised, warn};
 use crate::json::{of_text, text_of, to_python};
 
 /// A material in one revision; or one of a function, for exploration.
@@ -40,8 +40,19 @@ use crate::json::{of_text, text_of, to_python};
 pub(crate) struct Material {
     found: MaterialRevision,
     sampling_error_db: Option<f64>,
-    /// The function with its parameters.
-    function: Option<(Py<PyAny>, Vec<OwnParameter>)>,
+    function: Option<OwnFunction>,
+}
+
+/// A function of a program with its parameters.
+struct OwnFunction {
+    function: Py<PyAny>,
+    parameters: Vec<OwnParameter>,
+}
+
+impl OwnFunction {
+    fn clone_ref(&self, py: Python<'_>) -> (Py<PyAny>, Vec<OwnParameter>) {
+        (self.function.clone_ref(py), self.parameters.clone())
+    }
 }
 
 /// Why a function is no material.
@@ -65,20 +76,53 @@ impl Material {
         &self.found
     }
 
-    /// The law of its function, of which `fit` finds the parameters. Where the function fails, the work that calls it unwinds
-    /// with the error.
-    pub(crate) fn law(&self, py: Python<'_>) -> PyResult<OwnLaw> {
-        let Some((function, parameters)) =
-            self.function.as_ref().filter(|(_, own)| !own.is_empty())
-        else {
-            return Err(UsageError::new_err(format!(
+    /// The material of a function at the starts of its parameters.
+    fn sampled(
+        py: Python<'_>,
+        name: &str,
+        sigma0_db: &Bound<'_, PyAny>,
+        own: Vec<OwnParameter>,
+    ) -> PyResult<Material> {
+        let starts: Vec<f64> = own.iter().map(|parameter| parameter.start).collect();
+        let start = named(py, &own, &starts)?;
+        let slug: Slug = name.parse().map_err(|problem: String| UsageError::new_err(problem))?;
+        let sampled = SampledMaterial::new(slug, |angles_deg| {
+            levels_db(sigma0_db, &start, angles_deg).map_err(Refused::ByPython)
+        });
+        let sampled = sampled.map_err(|refused| match refused {
+            Refused::ByPython(error) => error,
+            Refused::ByMaterial(error) => raised(error),
+        });
+        let SampledMaterial { material, error_db, error_at_deg } = sampled?;
+        if error_db > 0.01 {
+            let notice = format!(
+                "{name}: between its samples the curve is up to {error_db:.2} dB off the function, at {error_at_deg:.2}°: the \
+                 function has a step there, or changes faster than the samples show"
+            );
+            warn(py, &[notice])?;
+        }
+        let found = MaterialRevision { material, revision: None };
+        let function = Some(OwnFunction { function: sigma0_db.clone().unbind(), parameters: own });
+        Ok(Material { found, sampling_error_db: Some(error_db), function })
+    }
+
+    /// Its function with free parameters.
+    fn own_function(&self) -> PyResult<&OwnFunction> {
+        let own = self.function.as_ref().filter(|own| !own.parameters.is_empty());
+        own.ok_or_else(|| {
+            UsageError::new_err(format!(
                 "{} has no parameters to fit; give it some, as in Material(name, function, parameters={{\"m\": (0.1, 0.01, 1)}}), or \
                  name a model",
                 self.name()
-            )));
-        };
-        let (function, own) = (function.clone_ref(py), parameters.clone());
-        let law = OwnLaw::new(parameters.clone(), move |values, angles_deg| {
+            ))
+        })
+    }
+
+    /// The law of its function, of which `fit` finds the parameters. Where the function fails, the work that calls it unwinds
+    /// with the error.
+    pub(crate) fn law(&self, py: Python<'_>) -> PyResult<OwnLaw> {
+        let (function, own) = self.own_function()?.clone_ref(py);
+        let law = OwnLaw::new(own.clone(), move |values, angles_deg| {
             let levels_db = Python::attach(|py| {
                 let named = named(py, &own, values)?;
                 levels_db(function.bind(py), &named, angles_deg)
@@ -132,8 +176,11 @@ fn parameter(name: String, given: &Bound<'_, PyAny>) -> PyResult<OwnParameter> {
 fn own_parameters(given: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<OwnParameter>> {
     let given = given.into_iter().flatten();
     let own = given.map(|(name, range)| parameter(name.extract()?, &range));
-    let own = own.collect::<PyResult<Vec<OwnParameter>>>()?;
-    // Refuses empty ranges, and starts outside.
+    checked(own.collect::<PyResult<Vec<OwnParameter>>>()?)
+}
+
+/// These parameters, unless a range is empty or a start outside.
+fn checked(own: Vec<OwnParameter>) -> PyResult<Vec<OwnParameter>> {
     let law = OwnLaw::new(own.clone(), |_, _| Vec::new());
     law.map(|_| own).map_err(|error| UsageError::new_err(error.to_string()))
 }
@@ -169,28 +216,22 @@ impl Material {
         sigma0_db: &Bound<'_, PyAny>,
         parameters: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Material> {
-        let own = own_parameters(parameters)?;
-        let starts: Vec<f64> = own.iter().map(|parameter| parameter.start).collect();
-        let start = named(py, &own, &starts)?;
-        let slug: Slug = name.parse().map_err(|problem: String| UsageError::new_err(problem))?;
-        let sampled = SampledMaterial::new(slug, |angles_deg| {
-            levels_db(sigma0_db, &start, angles_deg).map_err(Refused::ByPython)
-        });
-        let sampled = sampled.map_err(|refused| match refused {
-            Refused::ByPython(error) => error,
-            Refused::ByMaterial(error) => raised(error),
-        });
-        let SampledMaterial { material, error_db, error_at_deg } = sampled?;
-        if error_db > 0.01 {
-            let notice = format!(
-                "{name}: between its samples the curve is up to {error_db:.2} dB off the function, at {error_at_deg:.2}°: the \
-                 function has a step there, or changes faster than the samples show"
-            );
-            warn(py, &[notice])?;
+        Material::sampled(py, name, sigma0_db, own_parameters(parameters)?)
+    }
+
+    /// The material of the same function with other values of its parameters, such as those of a fit.
+    #[pyo3(signature = (**parameters))]
+    fn at(&self, py: Python<'_>, parameters: Option<&Bound<'_, PyDict>>) -> PyResult<Material> {
+        let (function, mut own) = self.own_function()?.clone_ref(py);
+        for (name, value) in parameters.into_iter().flatten() {
+            let name: String = name.extract()?;
+            let known: Vec<String> = own.iter().map(|parameter| parameter.name.clone()).collect();
+            let Some(parameter) = own.iter_mut().find(|parameter| parameter.name == name) else {
+                return Err(no_choice("parameter", &name, &known.join(", ")));
+            };
+            parameter.start = value.extract()?;
         }
-        let found = MaterialRevision { material, revision: None };
-        let function = Some((sigma0_db.clone().unbind(), own));
-        Ok(Material { found, sampling_error_db: Some(error_db), function })
+        Material::sampled(py, self.name(), function.bind(py), checked(own)?)
     }
 
     /// How far the curve of a function is off midway between its samples, dB; None for other materials.
@@ -283,7 +324,10 @@ impl Material {
     ) -> PyResult<Material> {
         let function = match function {
             None => None,
-            Some((function, parameters)) => Some((function, own_parameters(Some(&parameters))?)),
+            Some((function, parameters)) => {
+                let parameters = own_parameters(Some(&parameters))?;
+                Some(OwnFunction { function, parameters })
+            }
         };
         Ok(Material { found: of_text(text)?, sampling_error_db, function })
     }
@@ -298,10 +342,10 @@ impl Material {
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         let Material { found, sampling_error_db, function } = slf.get();
         // A function without parameters is in the samples, and many cannot be pickled.
-        let function = function.as_ref().filter(|(_, own)| !own.is_empty());
-        let function = match function {
+        let own = function.as_ref().filter(|own| !own.parameters.is_empty());
+        let function = match own {
             None => None,
-            Some((function, own)) => {
+            Some(OwnFunction { function, parameters: own }) => {
                 let parameters = PyDict::new(slf.py());
                 for OwnParameter { name, min, max, start } in own {
                     parameters.set_item(name, (start, min, max))?;

@@ -1032,17 +1032,21 @@ def test_the_parameters_of_a_function_are_fitted(scene, tmp_path):
     assert held.parameters["alpha"] == 5 and held.names == ["r_s", "looks"]
     assert np.allclose(held.sigma0_db([10, 40]), lobe(np.array([10, 40]), held.parameters["r_s"], 5), atol=0.02)
     db = md.open("own.sqlite")
-    with pytest.raises(md.UsageError, match="cannot be stored; save a Material"):
+    with pytest.raises(md.UsageError, match="cannot be stored; save the Material"):
         db.add("mine", found)
     # The way that this names.
-    best = md.Material("mine", lambda theta_deg: lobe(theta_deg, **found.parameters))
+    best = md.Material("mine", lobe, parameters={"r_s": (0.1, 1e-4, 1), "alpha": (20, 0.1, 1000)}).at(**found.parameters)
     best.save(tmp_path / "mine.toml")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         assert db.add(files=[tmp_path / "mine.toml"]) == ["mine@1"]
     assert np.allclose(db["mine"].sigma0_db([10, 40]), found.sigma0_db([10, 40]), atol=0.02)
     with pytest.raises(md.UsageError, match="no parameters to fit"):
-        curve.fit(best)
+        curve.fit(md.Material("mine", lambda theta_deg: -theta_deg))
+    with pytest.raises(md.UsageError, match="give r_s, alpha"):
+        best.at(beta=1)
+    with pytest.raises(md.UsageError, match="alpha = 0 is out of range"):
+        best.at(alpha=0)
     with pytest.raises(md.UsageError, match="no parameter `beta`.* there are: r_s, alpha"):
         curve.fit(own, fixed={"beta": 1})
     with pytest.raises(md.UsageError, match="m = 2 is out of range; give a value from 0 to 1"):
