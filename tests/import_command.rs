@@ -7,7 +7,8 @@ use std::path::Path;
 
 use crate::support::database::{changed, contents, sample, sound};
 use crate::support::{entries, list_hashes, matdb, refused};
-use matdb::catalogue::{About, publish};
+use matdb::adopt::publish;
+use matdb::catalogue::About;
 use matdb::material::Material;
 use matdb::store::Store;
 use serde_json::Value;

@@ -440,7 +440,7 @@ fn a_killed_publication_leaves_a_whole_one() {
         std::thread::sleep(std::time::Duration::from_millis(delay_ms));
         child.kill().unwrap();
         killed += u32::from(!child.wait().unwrap().success());
-        let said = matdb::catalogue::verify(&site).unwrap();
+        let said = matdb::adopt::verify(&site).unwrap();
         assert_eq!(said.problems, [], "after {delay_ms} ms");
         if fs::read(site.join("SHA256SUMS")).unwrap() != old {
             break;

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 
 use crate::support::database::{complete, fitted, refitted, sample, with_effects};
 use crate::support::{matdb, read_cloud};
-use matdb::catalogue::{About, publish};
+use matdb::adopt::publish;
+use matdb::catalogue::About;
 use matdb::material::{Material, SourceKind, builtin};
 use matdb::store::Store;
 

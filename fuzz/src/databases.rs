@@ -4,14 +4,15 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use matdb::adopt::{publish, verify};
 use matdb::brdf::Brdf;
-use matdb::catalogue::{About, Import, publish, verify};
+use matdb::catalogue::{About, Import};
 use matdb::fit::{Fit, Method};
 use matdb::formats::ColumnNames;
 use matdb::material::file::parse;
 use matdb::material::{Activity, Material, Slug, builtin, form};
 use matdb::measure::Curve;
-use matdb::report::angles_deg;
+use matdb::report::{angles_deg, catalogue_view};
 use matdb::store::{Filter, Store};
 use rusqlite::Connection;
 use rusqlite::config::DbConfig;
@@ -239,7 +240,7 @@ fn can_be_imported(bundle: &Path) -> bool {
     if !found.problems.is_empty() {
         return false;
     }
-    let import = Import::open(bundle).expect("what was verified can be opened");
+    let import = Import::open(bundle, catalogue_view).expect("what was verified can be opened");
     let mut ours = Store::in_memory().expect("a database in memory");
     // Names that would mislead, and effects of a newer program, are refused here.
     let Ok(plan) = import.plan(None, None) else { return true };

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use matdb::adopt::{
     CatalogueImport, CheckReport, CurveOrigin, DatabaseCheck, FitStorage, FitSubject,
-    FittedMaterial, NewMaterials, Withdrawal, remove_materials,
+    FittedMaterial, NewMaterials, Withdrawal, publish, remove_materials, verify,
 };
 use matdb::catalogue::exchange::{Details, Export, Format};
-use matdb::catalogue::{self, About, Citable, Credit, Diff, Rank, publish, references};
+use matdb::catalogue::{About, Citable, Credit, Diff, Rank, references};
 use matdb::error::Error;
 use matdb::files::{folder_of, read_small, write_all};
 use matdb::fit::model_names;
@@ -192,7 +192,7 @@ fn curve_of(
 /// dict
 #[pyfunction]
 pub(crate) fn verify<'py>(py: Python<'py>, bundle: PathBuf) -> PyResult<Bound<'py, PyAny>> {
-    let verified = py.detach(|| catalogue::verify(&bundle));
+    let verified = py.detach(|| verify(&bundle));
     to_python(py, &verified.map_err(raised)?)
 }
 

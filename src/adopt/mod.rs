@@ -1,10 +1,11 @@
 //! What goes back into the database: materials of files, measured curves, fits, and the law and the effects that a
-//! diagnosis found; each with its sources and with the command and the files that made it. Also catalogues of others,
-//! and what keeps a database sound: its check, withdrawals and removals.
+//! diagnosis found; each with its sources and with the command and the files that made it. Also catalogues of others
+//! and for others, and what keeps a database sound: its check, withdrawals and removals.
 
 mod earlier;
 pub mod admission;
 mod catalogue_import;
+mod catalogue_publication;
 mod curve;
 mod database_check;
 mod findings;
@@ -23,6 +24,7 @@ mod scene_after;
 mod withdrawal;
 
 pub use catalogue_import::CatalogueImport;
+pub use catalogue_publication::{publish, verify};
 pub use curve::{AddedCurve, CurveOrigin, add_curve, check_frequency_and_threshold};
 pub use database_check::{CheckProgress, CheckReport, DatabaseCheck};
 pub use earlier::{Earlier, check_folder};

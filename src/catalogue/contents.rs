@@ -7,9 +7,10 @@ use super::about::About;
 use super::api::{Entry, Index};
 use super::error::CatalogueError;
 use super::folder::{Checksum, Folder};
-use super::layout::{ABOUT, DATABASE};
+use super::layout::{ABOUT, DATABASE, VIEW};
 use super::licence::licence_of_all;
 use super::site::Site;
+use super::view::DrawView;
 use super::{api, records, tables};
 use crate::store::Store;
 
@@ -20,9 +21,10 @@ pub(super) fn rebuilt(
     about: &About,
     published: &Path,
     database: Checksum,
+    draw: DrawView,
 ) -> Result<BTreeMap<String, Checksum>, CatalogueError> {
     let mut folder = Folder::hashed(published, BTreeMap::from([(DATABASE.to_owned(), database)]))?;
-    write_contents(&mut folder, store, about, |_| ())?;
+    write_contents(&mut folder, store, about, draw, |_| ())?;
     Ok(folder.sums().clone())
 }
 
@@ -32,11 +34,14 @@ pub(super) fn write_contents(
     folder: &mut Folder,
     store: &Store,
     about: &About,
+    draw: DrawView,
     mut progress: impl FnMut(usize),
 ) -> Result<(usize, bool), CatalogueError> {
     folder.write(ABOUT, format!("{}\n", serde_json::json!(about)).as_bytes())?;
     // A licence that nobody declared is not recorded as declared: the next publication derives its own.
     let about = &About { licence: licence_of_all(store, about)?, ..about.clone() };
+    let view = draw(store, about)?;
+    folder.write(VIEW, &view.page)?;
     let (mut entries, mut site) = (Vec::new(), Site::new(about)?);
     for (number, summary) in store.list()?.iter().enumerate() {
         let Some(stored) = store.get(&summary.slug, None)? else {
@@ -46,7 +51,8 @@ pub(super) fn write_contents(
             ));
         };
         api::write(folder, &stored)?;
-        site.add(folder, &stored, &store.history(&summary.slug)?)?;
+        let place = view.places.get(&summary.slug).map(String::as_str);
+        site.add(folder, &stored, &store.history(&summary.slug)?, place)?;
         entries.push(Entry::new(summary, &stored));
         progress(number + 1);
     }

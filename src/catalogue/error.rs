@@ -162,6 +162,9 @@ pub enum CatalogueError {
     /// A file or folder cannot be read or written.
     #[error(transparent)]
     Files(#[from] FilesError),
+    /// The page of all materials in three dimensions could not be drawn.
+    #[error("view.html: {0}")]
+    View(Box<dyn std::error::Error + Send + Sync>),
     /// A page could not be made.
     #[error(transparent)]
     Page(#[from] PageError),

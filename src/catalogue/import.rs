@@ -10,12 +10,13 @@ use super::about::About;
 use super::error::CatalogueError;
 use super::layout::DATABASE;
 use super::read::{about, is_newer};
-use super::verify::{database, verify};
+use super::verify::{database, verify_with};
+use super::view::DrawView;
 use crate::effects::{Level, resolve};
 use crate::material::{Activity, Material, Origin, Slug};
 use crate::store::{Addition, Store, StoreError, StoredRevision};
 
-/// Another laboratory's catalogue that was [verified](super::verify()) and may be imported.
+/// Another laboratory's catalogue that was [verified](super::verify_with) and may be imported.
 #[derive(Debug)]
 pub struct Import {
     path: PathBuf,
@@ -74,11 +75,11 @@ pub struct ImportSummary {
 }
 
 impl Import {
-    /// Opens a published folder or its database after a complete check.
+    /// Opens a published folder or its database after a complete check, for which `draw` makes `view.html` again.
     ///
     /// # Errors
     /// When it is not a catalogue, anything in it is wrong, or a newer program made it.
-    pub fn open(bundle: &Path) -> Result<Import, CatalogueError> {
+    pub fn open(bundle: &Path, draw: DrawView) -> Result<Import, CatalogueError> {
         if bundle.is_dir() && is_newer(bundle) {
             return Err(CatalogueError::Newer { bundle: bundle.to_owned() });
         }
@@ -88,7 +89,7 @@ impl Import {
         {
             return Err(newer.into());
         }
-        let problems = verify(bundle)?.problems;
+        let problems = verify_with(bundle, draw)?.problems;
         if let Some(first) = problems.first() {
             let others = match problems.len() - 1 {
                 0 => String::new(),

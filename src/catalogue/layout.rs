@@ -17,6 +17,9 @@ pub(super) const INDEX: &str = "api/v1/index.json";
 /// The folder with a file for each material.
 pub(super) const MATERIALS: &str = "api/v1/materials/";
 
+/// The page of all materials in three dimensions.
+pub(super) const VIEW: &str = "view.html";
+
 /// The record that Zenodo reads.
 pub(super) const ZENODO: &str = ".zenodo.json";
 

@@ -1,4 +1,4 @@
-//! A database as a catalogue that others can read, trust and cite: [`publish`] writes a static site
+//! A database as a catalogue that others can read, trust and cite: [`publish_with`] writes a static site
 //! and, beside it, the data in open formats.
 //!
 //! Only what the database says goes in, and nothing of the machine or the hour: the same database and
@@ -33,6 +33,7 @@ mod spectrum;
 mod tables;
 mod units;
 mod verify;
+mod view;
 
 pub use about::{About, AboutError};
 pub use check_store::{CheckCount, Refit, StoreCheck};
@@ -43,7 +44,8 @@ pub use import::{Import, ImportSummary, MaterialPlan, Outcome};
 pub use near::{Distance, Probe, Rank};
 pub use nearest::Nearest;
 pub use problem::Problem;
-pub use publish::{PublishSummary, publish};
+pub use publish::{PublishSummary, publish_with};
 pub use references::{Citable, Credit, Reference, references};
 pub use spectrum::{Spectrum, spectra};
-pub use verify::{Verification, verify};
+pub use verify::{Verification, verify_with};
+pub use view::{CatalogueView, DrawView};

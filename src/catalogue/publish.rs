@@ -9,6 +9,7 @@ use super::folder::Folder;
 use super::layout::{DATABASE, ZENODO};
 use super::licence::undeclared;
 use super::verify::check_staged;
+use super::view::DrawView;
 use crate::store::Store;
 
 /// What was published.
@@ -28,15 +29,17 @@ pub struct PublishSummary {
 
 /// Writes every material of a database as a catalogue into a folder, all of it or nothing.
 ///
-/// An earlier publication there is replaced. `progress` gets the number of materials done.
+/// An earlier publication there is replaced. `draw` makes its `view.html`, and `progress` gets the number of materials
+/// done. [`adopt::publish`](crate::adopt::publish) has this program's page.
 ///
 /// # Errors
 /// When the database cannot be read or is damaged, a current fit does not follow from its curve, its materials share no licence and `about` declares none, the
-/// folder holds anything else, or something cannot be written.
-pub fn publish(
+/// folder holds anything else, the page cannot be drawn, or something cannot be written.
+pub fn publish_with(
     store: &Store,
     about: &About,
     target: &Path,
+    draw: DrawView,
     progress: impl FnMut(usize),
 ) -> Result<PublishSummary, CatalogueError> {
     // A copy would be packed anew, and with it damage that shows in the original alone.
@@ -46,7 +49,7 @@ pub fn publish(
     let copy = folder.place(DATABASE, |place| Ok::<(), CatalogueError>(store.copy_to(place)?))?;
     let copy = Store::open_existing(copy)?.map(|copy| copy.known_as(store));
     let store = copy.as_ref().unwrap_or(store);
-    let (materials, is_version_reused) = write_contents(&mut folder, store, about, progress)?;
+    let (materials, is_version_reused) = write_contents(&mut folder, store, about, draw, progress)?;
     let published = PublishSummary {
         materials,
         files: folder.sums().len() + 1,

@@ -12,6 +12,7 @@ use super::layout::{ABOUT, DATABASE, INDEX};
 use super::problem::{Problem, problem};
 use super::read::read;
 use super::tables::HAS_PARQUET;
+use super::view::DrawView;
 use crate::store::Store;
 
 /// Publishes once more, without writing, and compares file by file. Returns what was not compared, a sentence each.
@@ -19,6 +20,7 @@ pub(super) fn check_rebuilt(
     bundle: &Path,
     store: &Store,
     sums: &BTreeMap<String, String>,
+    draw: DrawView,
     problems: &mut Vec<Problem>,
 ) -> Vec<String> {
     let (scope, notes) = Scope::new(bundle, store, sums);
@@ -28,7 +30,7 @@ pub(super) fn check_rebuilt(
     }
     let made = database_sum(bundle, sums).and_then(|database| {
         let about = read::<About>(bundle, ABOUT).map_err(|what| problem(ABOUT, what))?;
-        rebuilt(store, &about, bundle, database).map_err(|error| problem(DATABASE, error))
+        rebuilt(store, &about, bundle, database, draw).map_err(|error| problem(DATABASE, error))
     });
     let made = match made {
         Ok(made) => made,

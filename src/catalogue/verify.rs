@@ -18,10 +18,11 @@ use super::listing::files;
 use super::problem::{Problem, problem};
 use super::read::{LARGEST_FILE_BYTES, LARGEST_TABLE_BYTES, read};
 use super::rebuild::check_rebuilt;
+use super::view::DrawView;
 use crate::files::FilesError;
 use crate::store::{Store, StoredRevision};
 
-/// What [`verify`] found.
+/// What [`verify_with`] found.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Verification {
     /// Files of the publication.
@@ -36,11 +37,12 @@ pub struct Verification {
     pub problems: Vec<Problem>,
 }
 
-/// Checks a published folder, or a database by itself.
+/// Checks a published folder, or a database by itself. `draw` makes `view.html` again, which is compared with the one
+/// there. [`adopt::verify`](crate::adopt::verify) has this program's page.
 ///
 /// # Errors
 /// When `bundle` is neither. Whatever is wrong inside is in [`Verification::problems`].
-pub fn verify(bundle: &Path) -> Result<Verification, CatalogueError> {
+pub fn verify_with(bundle: &Path, draw: DrawView) -> Result<Verification, CatalogueError> {
     let mut verified = Verification::default();
     let problems = &mut verified.problems;
     if bundle.is_file() {
@@ -70,7 +72,7 @@ pub fn verify(bundle: &Path) -> Result<Verification, CatalogueError> {
             verified.checked = check_content(bundle, &store, &sums, problems);
             // What is wrong already would be found wrong again in every file made of it.
             if problems.is_empty() {
-                verified.notes = check_rebuilt(bundle, &store, &sums, problems);
+                verified.notes = check_rebuilt(bundle, &store, &sums, draw, problems);
             }
         }
         Err(error) => problems.push(problem(DATABASE, error)),

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use super::console::Console;
 use super::summary::counted;
-use crate::catalogue::{About, publish};
+use crate::adopt::publish;
+use crate::catalogue::About;
 use crate::error::Error;
 use crate::files::{FilesError, WayOut, read_small};
 use crate::setup::Database;

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use super::console::Console;
 use super::summary::counted;
-use crate::catalogue::{Verification, verify};
+use crate::adopt::verify;
+use crate::catalogue::Verification;
 use crate::error::Error;
 
 /// Check a published catalogue, and fit again what it holds

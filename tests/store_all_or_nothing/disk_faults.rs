@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::Path;
 
-use matdb::adopt::{CatalogueImport, DatabaseCheck};
+use matdb::adopt::{CatalogueImport, DatabaseCheck, publish, verify};
 use matdb::brdf::{Brdf, Lambert, Sum};
-use matdb::catalogue::{About, Probe, Rank, publish, verify};
+use matdb::catalogue::{About, Probe, Rank};
 use matdb::material::Material;
 use matdb::setup::Database;
 use matdb::store::{Filter, Store};

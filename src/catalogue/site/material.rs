@@ -34,6 +34,8 @@ pub(super) struct Page<'a> {
     content_hash: &'a str,
     added_at: &'a str,
     sphere: Option<String>,
+    /// What stands behind `#` in the address of the page in three dimensions.
+    place: Option<&'a str>,
     picture: Option<String>,
     samples: Vec<Sample>,
     levels: Vec<(String, String)>,
@@ -88,6 +90,7 @@ pub(super) fn page<'a>(
     stored: &'a StoredRevision,
     history: &'a [RevisionSummary],
     citation: &'a Citation,
+    place: Option<&'a str>,
 ) -> Page<'a> {
     let material = &stored.material;
     let (picture, samples) = curve::picture(material);
@@ -109,6 +112,7 @@ pub(super) fn page<'a>(
         content_hash: &stored.content_hash,
         added_at: &stored.added_at,
         sphere: sphere::svg(material),
+        place,
         picture,
         samples,
         levels: levels(material),

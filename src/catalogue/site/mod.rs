@@ -75,16 +75,18 @@ impl<'a> Site<'a> {
         Ok(Site { about, templates, waiting: Vec::new(), portions: 0, materials: 0 })
     }
 
-    /// Writes the page of a material with what belongs to it, and notes it for the index.
+    /// Writes the page of a material with what belongs to it, and notes it for the index. `place`: where the page in three
+    /// dimensions shows it.
     pub(super) fn add(
         &mut self,
         folder: &mut Folder,
         stored: &StoredRevision,
         history: &[RevisionSummary],
+        place: Option<&str>,
     ) -> Result<(), CatalogueError> {
         let slug = stored.material.slug.as_str();
         let citation = Citation::new(self.about, stored);
-        let page = material::page(self.about, stored, history, &citation);
+        let page = material::page(self.about, stored, history, &citation, place);
         let html = self.templates.page("material.html", &page)?;
         folder.write(&format!("material/{slug}.html"), html.as_bytes())?;
         folder.write(&format!("material/{slug}.csv"), &table::csv(&stored.material)?)?;

@@ -10,16 +10,16 @@ use crate::formats::base64::base64;
 use crate::formats::figure::{Figure, Scale};
 use crate::frames::{Global, Point, Pose, Target};
 use crate::geometry::Raster;
-use crate::scene::Scene;
+use crate::radar::{Chirps, Radar};
 
 /// Corners of the outline of a spot.
 const CORNERS: u32 = 48;
 
-/// The radar of a scene, and where it looks.
-pub(super) fn instrument(scene: &Scene) -> Instrument {
-    let (radar, frames) = (scene.radar(), scene.radar().frames());
+/// A radar, and where it looks.
+pub(super) fn instrument(radar: &Radar, chirps: &Chirps) -> Instrument {
+    let frames = radar.frames();
     let target = &frames.global_from_target;
-    let aims = scene.chirps.target_points_m(&frames);
+    let aims = chirps.target_points_m(&frames);
     let radius_m = 0.5 * radar.spot_fwhm_m();
     let outline = (0..=CORNERS).map(|corner| {
         let (sin, cos) = (f64::from(corner) / f64::from(CORNERS) * TAU).sin_cos();

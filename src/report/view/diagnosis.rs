@@ -44,10 +44,11 @@ pub(in crate::report) fn diagnosis_page(scene: &Scene, report: &Report) -> Resul
             columns: columns(scene, &detections),
         },
         mesh: Surface::of(mesh),
-        radar: instrument(scene),
+        radar: instrument(scene.radar(), &scene.chirps),
         image: residual_image(scene, &rows)?,
         shapes: outlines(scene, &rows, &effects).into_iter().chain(moved(mesh, &effects)).collect(),
         curve: Curve { x: "incidence_deg", y: "residual_after_db" },
+        balls: None,
     };
     page.bytes()
 }

@@ -2,10 +2,12 @@
 //! file.
 
 mod around;
+mod catalogue;
 mod diagnosis;
 mod labels;
 mod page;
 mod rendering;
 
+pub use catalogue::catalogue_view;
 pub(super) use diagnosis::diagnosis_page;
 pub use rendering::rendering_page;

@@ -2,6 +2,7 @@
 
 use glam::{DMat4, DVec3};
 use serde::Serialize;
+use sha2::{Digest, Sha256};
 
 use super::labels::label;
 use crate::error::Error;
@@ -29,10 +30,23 @@ pub(in crate::report) struct ViewPage<'a> {
     pub image: Option<PlaneImage>,
     pub shapes: Vec<Outlines>,
     pub curve: Curve,
+    /// Of the page of a catalogue.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub balls: Option<Balls>,
+}
+
+/// What the page of a catalogue has in addition.
+#[derive(Serialize)]
+pub(in crate::report) struct Balls {
+    /// For every ball its name, the place of the name, m, and the room for it, m.
+    pub labels: Vec<(String, [f64; 3], f64)>,
+    /// What a person should know of the materials.
+    #[serde(skip)]
+    pub notices: Vec<String>,
 }
 
 /// The points of a cloud.
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 pub(in crate::report) struct Points {
     pub count: usize,
     /// In the global frame, three numbers a point.
@@ -111,6 +125,12 @@ pub(in crate::report) enum Numbers {
     F32(String),
     U16(String),
     U32(String),
+}
+
+impl Default for Numbers {
+    fn default() -> Numbers {
+        Numbers::floats(std::iter::empty())
+    }
 }
 
 impl Numbers {
@@ -225,6 +245,8 @@ impl ViewPage<'_> {
             title: &'a str,
             about: String,
             notes: &'a [String],
+            /// Of the page of a catalogue.
+            notices: Option<&'a [String]>,
             /// Of less and of more than predicted.
             hues: [f64; 2],
         }
@@ -237,9 +259,25 @@ impl ViewPage<'_> {
         let version = env!("CARGO_PKG_VERSION");
         let about = format!("{} of {points}, made by matdb {version}", self.kind);
         let hues = LESS_AND_MORE_HUE_DEG;
-        let page = Words { title: self.title, about, notes: &self.notes, hues };
-        templates::page("view.html", &Context { page, data: serde_json::to_string(self)? })
+        let notices = self.balls.as_ref().map(|balls| balls.notices.as_slice());
+        let page = Words { title: self.title, about, notes: &self.notes, notices, hues };
+        let page =
+            templates::text("view.html", &Context { page, data: serde_json::to_string(self)? })?;
+        Ok(with_policy(&page).into_bytes())
     }
+}
+
+/// A page that runs its own script and no other, and asks for nothing.
+fn with_policy(page: &str) -> String {
+    const START: &str = "<meta charset=\"utf-8\">\n";
+    let script = page.split_once("<script type=\"module\">");
+    let script = script.and_then(|(_, rest)| Some(rest.split_once("</script>")?.0));
+    let hash = base64(&Sha256::digest(script.unwrap_or_default()));
+    let policy = format!(
+        "{START}<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src 'sha256-{hash}'; \
+         style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'\">\n"
+    );
+    page.replacen(START, &policy, 1)
 }
 
 #[cfg(test)]
@@ -279,6 +317,7 @@ mod tests {
             image: None,
             shapes: vec![],
             curve: Curve { x: "incidence_deg", y: "power_dbm" },
+            balls: None,
         };
         let page = String::from_utf8(page.bytes().unwrap()).unwrap();
         for words in ["Large &lt;mesh&gt;", "Rendered cloud of 0 points", "It has 300 001 facets"] {

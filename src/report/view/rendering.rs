@@ -32,10 +32,11 @@ pub fn rendering_page(
         notes: Surface::left_out(&scene.target.mesh).into_iter().collect(),
         points: points(cloud, &[("region", &regions), ("material", materials)]),
         mesh: Surface::of(&scene.target.mesh),
-        radar: instrument(scene),
+        radar: instrument(scene.radar(), &scene.chirps),
         image: Some(image),
         shapes: Vec::new(),
         curve: Curve { x: "incidence_deg", y: "power_dbm" },
+        balls: None,
     };
     page.bytes()
 }
