@@ -9,8 +9,11 @@ use crate::support::database::{complete, fitted, refitted, sample, with_effects}
 use crate::support::{matdb, read_cloud};
 use matdb::adopt::publish;
 use matdb::catalogue::About;
+use matdb::formats::base64::base64;
 use matdb::material::{Material, SourceKind, builtin};
+use matdb::report::catalogue_view;
 use matdb::store::Store;
+use sha2::{Digest, Sha256};
 
 const HOSTILE: &str = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\"'&{{7*7}}{% x %}\u{1}\u{1b}[2J\u{202e}abc\u{2028}";
 
@@ -105,8 +108,9 @@ fn site() -> Site {
 }
 
 impl Site {
+    /// Every page but that in three dimensions, which has a script and a style of its own.
     fn pages(&self) -> impl Iterator<Item = (&String, &String)> {
-        self.files.iter().filter(|(path, _)| path.ends_with(".html"))
+        self.files.iter().filter(|(path, _)| path.ends_with(".html") && *path != "view.html")
     }
 }
 
@@ -198,6 +202,89 @@ fn nothing_is_loaded_from_elsewhere_and_nothing_runs_inside_a_page() {
         }
         let outside = text.replace("http://www.w3.org/2000/svg", "");
         assert!(!outside.contains("://"), "{path} names an address");
+    }
+}
+
+/// The script of the page in three dimensions, and the data that it reads.
+fn script_and_data(view: &str) -> (&str, serde_json::Value) {
+    let (before, script) = view.split_once("<script type=\"module\">").unwrap();
+    let (_, data) = before.split_once("<script type=\"application/json\" id=\"view\">").unwrap();
+    let data = serde_json::from_str(data.split_once("</script>").unwrap().0).unwrap();
+    (script.split_once("</script>").unwrap().0, data)
+}
+
+#[test]
+fn one_page_shows_every_material_that_can_be_rendered_in_three_dimensions() {
+    let site = site();
+    let view = &site.files["view.html"];
+    let (script, data) = script_and_data(view);
+    let hash = Sha256::digest(script);
+    let policy = format!(
+        "content=\"default-src 'none'; script-src 'sha256-{}'; style-src 'unsafe-inline'; img-src data:;",
+        base64(&hash)
+    );
+    assert!(view.contains(&policy), "it runs its own script only");
+    assert!(!view.contains("://") && !view.contains("url(") && !script.contains("import"));
+    assert!(view.contains("<h1>Materials in three dimensions – Catalogue of &lt;&#x2f;script"));
+    let names = |list: &serde_json::Value| -> Vec<String> {
+        let names = list.as_array().unwrap().iter();
+        names.map(|name| name.as_str().unwrap().to_owned()).collect()
+    };
+    let columns = data["points"]["columns"].as_array().unwrap();
+    let shown = names(&columns.iter().find(|one| one["name"] == "material").unwrap()["names"]);
+    let mut expected: Vec<String> = materials()
+        .into_iter()
+        .filter(|material| material.scattering().is_ok())
+        .map(|material| material.slug.to_string())
+        .collect();
+    expected.sort();
+    assert_eq!(shown, expected);
+    let labels = data["balls"]["labels"].as_array().unwrap();
+    assert_eq!(labels.iter().map(|label| label[0].as_str().unwrap()).collect::<Vec<_>>(), expected);
+    // Material pages lead to their balls, where the page has one.
+    let index = tags(&site.files["index.html"]);
+    let leads = |tags: &[(String, BTreeMap<String, String>)], start: &str| {
+        tags.iter().any(|(_, keys)| keys.get("href").is_some_and(|href| href.starts_with(start)))
+    };
+    assert!(leads(&index, "view.html"));
+    for material in materials() {
+        let slug = material.slug.to_string();
+        let page = tags(&site.files[&format!("material/{slug}.html")]);
+        assert_eq!(leads(&page, "../view.html#camera="), expected.contains(&slug), "{slug}");
+    }
+}
+
+#[test]
+fn the_page_in_three_dimensions_says_what_it_leaves_out_and_has_the_same_bytes_on_one_thread() {
+    let root = tempfile::tempdir().unwrap();
+    let mut store = Store::open(root.path().join("a.sqlite")).unwrap();
+    let paint = builtin::get("mannequin-paint").unwrap().unwrap();
+    let numbered = |number: usize| Material {
+        slug: format!("m{number:03}").parse().unwrap(),
+        ..paint.clone()
+    };
+    store.add(&(0..103).map(numbered).collect::<Vec<_>>()).unwrap();
+    let drawn = catalogue_view(&store, &about()).unwrap();
+    let page = String::from_utf8(drawn.page.clone()).unwrap();
+    assert!(page.contains("Not shown: 3 further materials. This page holds the first 100."));
+    assert_eq!(drawn.places.len(), 100);
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    assert!(one.install(|| catalogue_view(&store, &about()).unwrap()) == drawn);
+}
+
+#[test]
+fn the_page_of_the_built_in_materials_is_small_and_has_a_point_of_each() {
+    let mut store = Store::in_memory().unwrap();
+    let all: Vec<Material> =
+        builtin::names().map(|name| builtin::get(name).unwrap().unwrap()).collect();
+    store.add(&all).unwrap();
+    let drawn = catalogue_view(&store, &About::default()).unwrap();
+    // A page that a phone loads at once.
+    const MOST_BYTES: usize = 1_000_000;
+    assert!(drawn.page.len() < MOST_BYTES, "{} bytes", drawn.page.len());
+    assert_eq!(drawn.places.len(), all.len());
+    for (slug, place) in &drawn.places {
+        assert!(place.contains("&point="), "{slug} has no point: {place}");
     }
 }
 

@@ -1,8 +1,12 @@
-//! Promise: `view.html` shows the cloud of a rendering or of a diagnosis in a real browser, from a folder: its points, their
+//! Promise: `view.html` shows the cloud of a rendering, of a diagnosis or of a catalogue in a real browser, from a folder: its points, their
 //! columns, thresholds and picked points; it says nothing on the console and asks for nothing else.
 
 use std::path::Path;
 
+use matdb::adopt::publish;
+use matdb::catalogue::About;
+use matdb::material::{Material, builtin};
+use matdb::store::Store;
 use serde_json::{Value, json};
 
 use crate::support::browser::Browser;
@@ -109,6 +113,36 @@ fn a_rendering_is_shown_in_three_dimensions() {
     stays_when_a_menu_takes_the_release(&browser);
     returns_after_lost_graphics(&browser, [x, y]);
     was_quiet(&browser);
+}
+
+#[test]
+fn a_catalogue_leads_from_a_material_to_its_ball() {
+    let folder = tempfile::tempdir().unwrap();
+    let Some(browser) = Browser::in_three_dimensions(folder.path()) else { return };
+    let mut store = Store::in_memory().unwrap();
+    let names = ["aluminium", "cotton", "mannequin-paint"];
+    let materials: Vec<Material> =
+        names.iter().map(|name| builtin::get(name).unwrap().unwrap()).collect();
+    store.add(&materials).unwrap();
+    let site = folder.path().join("site");
+    publish(&store, &About::default(), &site, |_| ()).unwrap();
+    browser.open(&format!("file://{}", site.join("material/cotton.html").display()));
+    browser.click(".actions a[href^='../view.html']");
+    browser.wait("return !!window.matdbView");
+    browser.script("window.matdbView.ready.then(() => { window.isReady = true })");
+    browser.wait("return window.isReady === true");
+    // The point that is chosen is one of cotton, in the middle of the scene.
+    browser.wait("return document.querySelector('#values').innerText.includes('cotton')");
+    let point = browser.script("return window.matdbView.state().point");
+    let [x, y] = [("0", "Width"), ("1", "Height")].map(|(at, side)| {
+        let pixel = format!("window.matdbView.pixelOf({point})[{at}]");
+        let share = format!("return {pixel} / document.querySelector('#cloud').client{side}");
+        browser.script(&share).as_f64().unwrap()
+    });
+    assert!((0.25..0.75).contains(&x) && (0.25..0.75).contains(&y), "{x} {y}");
+    was_quiet(&browser);
+    browser.click("nav a[href='index.html']");
+    browser.wait("return document.querySelectorAll('#results h2').length === 3");
 }
 
 /// The whole residual map before and after, on a screen of 1280 × 800.

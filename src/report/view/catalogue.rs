@@ -6,13 +6,14 @@ use std::path::Path;
 
 use glam::{DQuat, DVec3};
 
-use super::around::{in_plane, instrument, plane_image};
+use super::around::{instrument, plane_image};
 use super::page::{Balls, Curve, Numbers, PlaneImage, Points, Surface, Values, ViewPage};
 use crate::catalogue::{About, CatalogueError, CatalogueView};
 use crate::effects::{Level, resolve};
 use crate::error::Error;
 use crate::formats::figure::Scale;
-use crate::formats::words::{counted, listed, shortened};
+use crate::formats::words::{counted, fixed, listed, shortened};
+use crate::frames::{Point, target_z_m};
 use crate::geometry::Mesh;
 use crate::material::{Material, Slug};
 use crate::radar::scan::Raster;
@@ -41,6 +42,8 @@ const ROUNDING_RAD: f64 = 1e-7;
 const DRAWN_SUBDIVISIONS: u32 = 2;
 /// How far below its middle the name of a ball stands, m.
 const LABEL_BELOW_M: f64 = RADIUS_M + 0.008;
+/// Room for the name, m.
+const LABEL_ROOM_M: f64 = 0.95 * PITCH_M;
 /// What the scene is called in an error.
 const NAME: &str = "view.html";
 
@@ -86,9 +89,10 @@ impl Chosen {
     fn notes(&self) -> Vec<String> {
         let mut notes = vec![format!(
             "Every ball is a material, {:.0} mm wide and in the middle of the same beam. Each point is one ray of the \
-             preset radar, with the mean power, without speckle and noise. Points below {FAINTEST_DBM:.0} dBm are left \
-             out, and those at angles that an entry does not claim.",
-            2e3 * RADIUS_M
+             preset radar, with the mean power; the glint of a narrow lobe has the level of a flat surface. Points \
+             below {} dBm are left out, and those at angles that an entry does not claim.",
+            2e3 * RADIUS_M,
+            fixed(FAINTEST_DBM, 0)
         )];
         if !self.left_out.is_empty() {
             let names: Vec<&str> = self.left_out.iter().map(|(slug, _)| slug.as_str()).collect();
@@ -132,10 +136,9 @@ impl Grid {
         };
         // The same beam for all.
         radar.beam.edge_growth = 1.0;
-        let target = radar.frames().global_from_target;
         let centres = (0..balls).map(|ball| {
             let [column, row] = [ball % columns, ball / columns].map(|place| place as f64 + 0.5);
-            in_plane(&target, column * PITCH_M - 0.5 * width_m, 0.5 * height_m - row * PITCH_M)
+            aim(&radar, column * PITCH_M - 0.5 * width_m, 0.5 * height_m - row * PITCH_M)
         });
         let centres = centres.collect();
         Grid { radar, centres }
@@ -169,6 +172,13 @@ impl Grid {
         }
         Surface::of(&mesh)
     }
+}
+
+/// Where a chirp of a pattern through a point of the target plane aims at, at the range of the pattern.
+fn aim(radar: &Radar, xt_m: f64, yt_m: f64) -> DVec3 {
+    let frames = radar.frames();
+    let zt_m = target_z_m(xt_m, yt_m, frames.pattern_range_m, frames.reflector_centre);
+    (frames.global_from_target * Point::new(xt_m, yt_m, zt_m.unwrap_or_default())).xyz
 }
 
 fn mesh_entry(name: &str) -> MeshEntry {
@@ -260,7 +270,10 @@ impl Rendered {
         let image = ready.image(&scan);
         let image = plane_image(&image, "power_dbm", colours, "Received power".to_owned())?;
         let mut notices = ready.notices();
-        notices.extend(ready.validity(&setup, &footprints).iter().map(ToString::to_string));
+        // What has a way out is about balls, which a note says of all of them.
+        let validity = ready.validity(&setup, &footprints);
+        let validity = validity.iter().filter(|warning| warning.way_out.is_none());
+        notices.extend(validity.map(ToString::to_string));
         Ok(Rendered {
             points: points(&echoes, names),
             image: Some(image),
@@ -320,12 +333,18 @@ fn strongest(echoes: &[&Echo], regions: usize) -> Vec<Option<usize>> {
     strongest
 }
 
+/// A place to a tenth of a millimetre.
+fn rounded(place: DVec3) -> [f64; 3] {
+    // Without the sign of a zero.
+    place.to_array().map(|at| (1e4 * at).round() / 1e4 + 0.0)
+}
+
 /// What stands behind `#` in the address for a view of one ball from the side, with a point chosen.
 fn address(centre: DVec3, point: Option<usize>) -> String {
     /// Angles of the camera about the ball and of its field of view, rad, and its distance, m.
     const YAW_PITCH_DISTANCE: &str = "0.5,0.3,0.45";
     const FIELD_OF_VIEW: &str = "0.6";
-    let [x, y, z] = centre.to_array().map(|at| format!("{at:.4}"));
+    let [x, y, z] = rounded(centre);
     let camera = format!("camera=[{YAW_PITCH_DISTANCE},{x},{y},{z},{FIELD_OF_VIEW}]");
     let point = point.map_or(String::new(), |point| format!("&point={point}"));
     camera + &point
@@ -343,7 +362,7 @@ fn draw(chosen: &Chosen, about: &About) -> Result<CatalogueView, Error> {
     };
     let obstacles = left_out.iter().map(|(slug, obstacle)| format!("`{slug}`: {obstacle}"));
     let labels = std::iter::zip(&names, &grid.centres).map(|(name, centre)| {
-        ((*name).to_owned(), (*centre - LABEL_BELOW_M * DVec3::Y).to_array(), PITCH_M)
+        ((*name).to_owned(), rounded(*centre - LABEL_BELOW_M * DVec3::Y), LABEL_ROOM_M)
     });
     let page = ViewPage {
         title: &format!("Materials in three dimensions – {}", shortened(&about.title, 80)),
