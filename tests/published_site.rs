@@ -269,7 +269,8 @@ fn the_page_in_three_dimensions_says_what_it_leaves_out_and_has_the_same_bytes_o
     assert!(page.contains("Not shown: 3 further materials. This page holds the first 100."));
     assert_eq!(drawn.places.len(), 100);
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    assert!(one.install(|| catalogue_view(&store, &about()).unwrap()) == drawn);
+    let again = one.install(move || catalogue_view(&store, &about()).unwrap());
+    assert!(again == drawn);
 }
 
 #[test]

@@ -31,8 +31,8 @@ const MOST_BALLS: usize = 100;
 const RADIUS_M: f64 = 0.055;
 /// From one chirp to the next in the target plane, m.
 const STEP_M: f64 = 0.006;
-/// Steps from one ball to the next. The middle one of a ball is a chirp that its nearest point faces.
-const STEPS_PER_BALL: usize = 22;
+/// Chirps from one ball to the next: an odd number, so that one meets the middle of each.
+const STEPS_PER_BALL: usize = 21;
 const PITCH_M: f64 = STEP_M * STEPS_PER_BALL as f64;
 /// Below the preset's threshold, so that weak surfaces are seen, too, dBm.
 const FAINTEST_DBM: f64 = -110.0;
@@ -47,9 +47,9 @@ const LABEL_ROOM_M: f64 = 0.95 * PITCH_M;
 /// What the scene is called in an error.
 const NAME: &str = "view.html";
 
-/// Draws the page of all materials of a database, of which none needs a mesh or a file.
+/// Draws the page of all materials of a database.
 ///
-/// Every material has a ball of its own size and distance in the same beam, so that levels compare.
+/// All balls have the same size, range and beam, so that levels compare.
 ///
 /// # Errors
 /// A database that cannot be read.
@@ -127,8 +127,8 @@ impl Grid {
         let mut radar = Radar {
             threshold_dbm: FAINTEST_DBM,
             scan: Pattern::Raster(Raster {
-                lines: rows * STEPS_PER_BALL + 1,
-                chirps_per_line: columns * STEPS_PER_BALL + 1,
+                lines: rows * STEPS_PER_BALL,
+                chirps_per_line: columns * STEPS_PER_BALL,
                 width_m,
                 height_m,
             }),
@@ -383,4 +383,54 @@ fn draw(chosen: &Chosen, about: &About) -> Result<CatalogueView, Error> {
     let places =
         places.map(|((material, centre), point)| (material.slug.clone(), address(*centre, point)));
     Ok(CatalogueView { page: page.bytes()?, places: places.collect() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::builtin;
+
+    /// Balls on the page of the built-in materials, about.
+    const BALLS: usize = 40;
+
+    #[test]
+    fn a_chirp_meets_every_ball_face_on_so_that_equal_mirrors_have_equal_levels() {
+        let steel = builtin::get("steel").unwrap().unwrap();
+        let numbered = |number: usize| Material {
+            slug: format!("steel-{number}").parse().unwrap(),
+            ..steel.clone()
+        };
+        let materials: Vec<Material> = (0..BALLS).map(numbered).collect();
+        let scene = Grid::new(BALLS).scene(&materials).unwrap();
+        let ready = ReadyScene::new(scene, Path::new(NAME), None).unwrap();
+        let assembly = ready.assemble();
+        let setup = assembly.setup();
+        let footprints = assembly.trace(&setup, &|_| ()).unwrap();
+        let scan = assembly.shade(&setup, &footprints, &|_| ()).unwrap();
+        let mut peaks_dbm = vec![f64::NEG_INFINITY; BALLS];
+        for echo in scan.detections() {
+            let region = region_of(echo).unwrap();
+            peaks_dbm[region] = peaks_dbm[region].max(dbm_from_watts(echo.power_w));
+        }
+        // All that was sent, less what the system loses: a mirror that faces the radar.
+        let radar = ready.scene.radar();
+        let most_dbm = radar.transmit_power_dbm - radar.system_loss_db;
+        // Of steel's reflection, and of a ball that stands nearer than the focus.
+        const NEAR_DB: f64 = 0.1;
+        for peak_dbm in peaks_dbm {
+            assert!((peak_dbm - most_dbm).abs() < NEAR_DB, "{peak_dbm} dBm, {most_dbm} dBm");
+        }
+    }
+
+    #[test]
+    fn balls_stand_in_rows_that_make_a_square_and_do_not_touch() {
+        for balls in [0, 1, 2, 40, MOST_BALLS] {
+            let centres = Grid::new(balls).centres;
+            assert_eq!(centres.len(), balls);
+            for (number, one) in centres.iter().enumerate() {
+                let others = centres[number + 1..].iter();
+                assert!(others.clone().all(|other| one.distance(*other) > 2.0 * RADIUS_M));
+            }
+        }
+    }
 }
