@@ -333,7 +333,7 @@ fn the_diagnosis_of_a_curve_runs_on_the_columns_of_the_docs() {
 #[test]
 fn the_material_of_the_docs_is_accepted() {
     let text = read("docs/materials.md");
-    assert_eq!(blocks(&text, "toml")[0], read("src/cli/add/template.toml"));
+    assert_eq!(blocks(&text, "toml")[0], read("src/setup/material-template.toml"));
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("material.toml"), blocks(&text, "toml")[0]).unwrap();
     fs::write(folder.path().join("scan.csv"), blocks(&text, "csv")[0]).unwrap();

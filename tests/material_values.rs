@@ -78,7 +78,7 @@ fn each_impossible_value_has_its_sentence() {
 
 #[test]
 fn a_file_is_read_in_its_units() {
-    let text = include_str!("../src/cli/add/template.toml");
+    let text = include_str!("../src/setup/material-template.toml");
     let csv = b"theta_deg,sigma0_db\n0,5\n20,-10\n".to_vec();
     let material = file::parse("material.toml", text, |_| Ok(csv.clone())).unwrap();
     let near = |value: Option<f64>, expected: f64| {

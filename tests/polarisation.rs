@@ -173,7 +173,7 @@ fn what_is_no_polarisation_is_refused_by_name() {
 #[test]
 fn a_curve_measured_across_the_polarisation_that_was_sent_is_named() {
     let folder = tempfile::tempdir().unwrap();
-    let text = include_str!("../src/cli/add/template.toml");
+    let text = include_str!("../src/setup/material-template.toml");
     std::fs::write(folder.path().join("scan.csv"), "theta_deg,sigma0_db\n0,5\n20,-10\n").unwrap();
     let path = folder.path().join("scene.toml");
     std::fs::write(&path, scene("", "").replace("human-skin", "my-paint")).unwrap();

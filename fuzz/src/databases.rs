@@ -20,7 +20,7 @@ use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 
 /// A complete material file.
-const COMPLETE: &str = include_str!("../../src/cli/add/template.toml");
+const COMPLETE: &str = include_str!("../../src/setup/material-template.toml");
 const POINTS: &str = "theta_deg,sigma0_db,censor,threshold_db\n0,5,none,-30\n15,-2,none,-30\n\
                       30,-8,none,-30\n45,-15,none,-30\n60,-19,none,-30\n70,,left,-30\n";
 

@@ -37,10 +37,10 @@ pub use measurement::{MeasurementStorage, StoredMeasurement};
 pub use provenance::{activity, add_source, input};
 pub use publication::{Publication, PublicationResult};
 pub use recipients::{
-    Adoption, Recipient, check_fit_name, find_recipient, pinned_name, replaced_name,
+    Adoption, Recipient, check_recipients, find_recipient, pinned_name, replaced_name,
 };
 pub use removal::{Removal, remove_materials};
-pub use request::{CheckedRequest, CloudRequest, as_answer};
+pub use request::{CheckedRequest, CloudRequest, FurtherScene, as_answer, scene_of_each};
 pub use scene_after::{
     AFTER, MARK, check_beside, moved_scene, name_beside, relocate_files, scene_with_found,
 };

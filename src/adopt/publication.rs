@@ -91,6 +91,17 @@ impl<'a> Publication<'a> {
         Publication { checked, adoption, recipients, report: CloudReport::new(answer), next }
     }
 
+    /// The same for a caller who has the scenes with what was found in the folder of the report, and not next to the old ones.
+    pub fn with_scenes_in_folder(mut self) -> Publication<'a> {
+        self.next.scene_beside.clone_from(&self.next.scene_after);
+        self
+    }
+
+    /// The first cloud of every scene, from 0, in the order in which [`Publication::store`] gives the scenes.
+    pub fn cloud_of_each_scene(&self) -> Vec<usize> {
+        self.scenes().iter().map(|one| usize::from(one.clouds[0])).collect()
+    }
+
     /// The report.
     pub fn report(&self) -> &CloudReport<'a> {
         &self.report
@@ -269,7 +280,10 @@ impl<'a> Publication<'a> {
         let others = further.iter().map(|one| (&one.ready.scene, &*one.path, &one.text));
         let mut scenes: Vec<DiagnosedScene> = Vec::new();
         for (cloud, (scene, path, text)) in (0..).zip([first].into_iter().chain(others)) {
-            let is_it = |known: &&mut DiagnosedScene| real(known.path) == real(path);
+            // A program may have scenes that differ from those of their files.
+            let is_it = |known: &&mut DiagnosedScene| {
+                real(known.path) == real(path) && known.text == text.as_str()
+            };
             match scenes.iter_mut().find(is_it) {
                 Some(known) => known.clouds.push(cloud),
                 None => scenes.push(DiagnosedScene { scene, path, text, clouds: vec![cloud] }),

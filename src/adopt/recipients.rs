@@ -53,12 +53,21 @@ pub fn find_recipient(ready: &ReadyScene, name: &str) -> Result<usize, Error> {
     })
 }
 
-/// Checks that every material of a scene can receive a fit of the name that a diagnosis gives.
+/// Checks that the materials of a scene can receive what a diagnosis finds: they are those of a database, and can have a fit
+/// of the name that a diagnosis gives.
 ///
 /// # Errors
-/// A material has a curve of that name.
-pub fn check_fit_name(ready: &ReadyScene) -> Result<(), Error> {
-    for SceneMaterial { found: MaterialRevision { material, .. }, .. } in &ready.materials {
+/// A material that a program gave; a material with a curve of that name.
+pub fn check_recipients(ready: &ReadyScene) -> Result<(), Error> {
+    for SceneMaterial { name, found: MaterialRevision { material, .. }, .. } in &ready.materials {
+        if ready.scene.given.contains_key(name) {
+            return Err(Error::Usage {
+                problem: format!(
+                    "`{name}` is a material that the scene was given, and in no database"
+                ),
+                way_out: "add it to the database, and name it in the scene".to_owned(),
+            });
+        }
         if material.curves.iter().any(|curve| curve.name == FIT) {
             return Err(Error::Usage {
                 problem: format!(

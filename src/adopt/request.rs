@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::earlier::check_folder;
-use super::recipients::{check_fit_name, find_recipient};
+use super::recipients::{check_recipients, find_recipient};
 use super::scene_after::{AFTER, after_of, check_beside};
 use crate::diagnose::{
     DiagnoseError, MeasuredScene, Options, Report, declared_receiver, diagnose_together,
@@ -11,6 +11,7 @@ use crate::diagnose::{
 use crate::effects::{About, Antenna, BeamSpot, Effect, RangeCell, SecondBounce, Setting, library};
 use crate::error::Error;
 use crate::files::folder_of;
+use crate::formats::words::counted;
 use crate::material::Input;
 use crate::measure::{Cloud, CloudError};
 use crate::radar::{Pattern, Radar, RadarError, Receiver, Returns};
@@ -87,11 +88,23 @@ pub struct FurtherScene {
 impl FurtherScene {
     fn load(path: &Path, store: Option<&Store>) -> Result<FurtherScene, Error> {
         let text = read_text(path)?;
-        let scene = Scene::load(path)?;
-        check_predicted(&scene, path, None)?;
-        let ready = ReadyScene::new(scene, path, store)?;
-        check_declared(&ready, path, None)?;
+        let ready = ReadyScene::new(Scene::load(path)?, path, store)?;
         Ok(FurtherScene { path: path.to_owned(), ready, text })
+    }
+}
+
+/// The scene of each of several clouds: one for each in the same order, or one for all.
+///
+/// # Errors
+/// Another number of scenes.
+pub fn scene_of_each<Given: Copy>(scenes: &[Given], clouds: usize) -> Result<Vec<Given>, Error> {
+    match scenes {
+        [one] => Ok(vec![*one; clouds]),
+        _ if scenes.len() == clouds => Ok(scenes.to_vec()),
+        _ => Err(Error::usage(
+            format!("{} for {}", counted(scenes.len(), "scene"), counted(clouds, "cloud")),
+            "give --scene once for each cloud, in the same order, or once for all",
+        )),
     }
 }
 
@@ -119,26 +132,16 @@ impl<'a> CloudRequest<'a> {
     /// A scene that cannot be loaded or declares what no diagnosis predicts; a folder with files of somebody else;
     /// effects or a material that do not suit the scene.
     pub fn check(self, store: Option<&Store>) -> Result<CheckedRequest<'a>, Error> {
-        self.check_scene(Scene::load(self.scene)?, read_text(self.scene)?, store)
-    }
-
-    /// As [`CloudRequest::check`], of a scene that is loaded, with the text of its file; that need not be what the file has.
-    ///
-    /// # Errors
-    /// As [`CloudRequest::check`].
-    pub fn check_scene(
-        self,
-        scene: Scene,
-        scene_text: String,
-        store: Option<&Store>,
-    ) -> Result<CheckedRequest<'a>, Error> {
-        let ready = ReadyScene::new(scene, self.scene, store)?;
-        let checked = self.check_ready(ready, scene_text, store)?;
+        let FurtherScene { ready, text, .. } = FurtherScene::load(self.scene, store)?;
+        let further = self.further.iter().map(|(_, path)| FurtherScene::load(path, store));
+        let further = further.collect::<Result<_, _>>()?;
+        let checked = self.check_ready(ready, text, further)?;
         checked.check_output()?;
         Ok(checked)
     }
 
-    /// As [`CloudRequest::check_scene`], of a scene with its materials, and without a look at the folder of the report.
+    /// As [`CloudRequest::check`], of scenes with their materials and the texts of their files, which need not be what the
+    /// files have; and without a look at the files that will be written. `further` are those of the further clouds.
     ///
     /// # Errors
     /// As [`CloudRequest::check`].
@@ -146,13 +149,15 @@ impl<'a> CloudRequest<'a> {
         self,
         ready: ReadyScene,
         scene_text: String,
-        store: Option<&Store>,
+        further: Vec<FurtherScene>,
     ) -> Result<CheckedRequest<'a>, Error> {
         let antenna = self.receiver.map(|name| self.antenna(&ready.scene, name)).transpose()?;
         check_predicted(&ready.scene, self.scene, antenna)?;
         check_declared(&ready, self.scene, antenna)?;
-        let further = self.further.iter().map(|(_, path)| FurtherScene::load(path, store));
-        let further = further.collect::<Result<Vec<_>, _>>()?;
+        for FurtherScene { path, ready, .. } in &further {
+            check_predicted(&ready.scene, path, None)?;
+            check_declared(ready, path, None)?;
+        }
         self.check_together(&ready, &further)?;
         let recipient = self.material.map(|name| find_recipient(&ready, name)).transpose()?;
         if self.add && !self.own_effects.is_empty() {
@@ -162,9 +167,7 @@ impl<'a> CloudRequest<'a> {
             ));
         }
         if self.add {
-            check_beside(self.scene)?;
-            further.iter().try_for_each(|scene| check_beside(&scene.path))?;
-            check_fit_name(&ready)?;
+            check_recipients(&ready)?;
         }
         let scenes: Vec<&ReadyScene> =
             [&ready].into_iter().chain(further.iter().map(|one| &one.ready)).collect();
@@ -223,6 +226,7 @@ impl<'a> CloudRequest<'a> {
         let regions = &first.scene.target.regions;
         for other in further {
             let own = &other.ready.scene.target.regions;
+            check_given(first, &other.ready)?;
             let pairs = regions.iter().zip(own);
             let differs = pairs.clone().find(|(a, b)| a.name != b.name || a.material != b.material);
             let [path, own_path] = [self.scene, &other.path].map(|path| path.display().to_string());
@@ -316,7 +320,12 @@ impl CheckedRequest<'_> {
         }
         let read = self.files_read();
         let read: Vec<&Path> = read.iter().map(PathBuf::as_path).collect();
-        check_folder(self.request.folder, &read, &written)
+        check_folder(self.request.folder, &read, &written)?;
+        if self.request.add {
+            check_beside(self.request.scene)?;
+            self.further.iter().try_for_each(|scene| check_beside(&scene.path))?;
+        }
+        Ok(())
     }
 
     /// The files that it is made of: clouds, scenes, and what these name.
@@ -486,6 +495,17 @@ impl Rendered {
         let bounce = self.bounce.as_ref().map(|bounce| (bounce as &dyn Effect, Vec::new()));
         spot.into_iter().chain(bounce).collect()
     }
+}
+
+/// Refuses scenes whose program gave them different materials under one name.
+fn check_given(first: &ReadyScene, other: &ReadyScene) -> Result<(), Error> {
+    let (given, others) = (&first.scene.given, &other.scene.given);
+    let differing =
+        given.iter().find(|(name, one)| others.get(*name).is_some_and(|two| two != *one));
+    differing.map_or(Ok(()), |(name, _)| {
+        let problem = format!("`{name}` is one material in a scene and another one in the next");
+        Err(Error::usage(problem, "give all scenes the same materials"))
+    })
 }
 
 /// Refuses effects that the scene or its materials declare and that have no meaning for this cloud.

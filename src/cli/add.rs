@@ -10,7 +10,7 @@ use super::console::Console;
 use crate::adopt::NewMaterials;
 use crate::error::Error;
 use crate::material::builtin;
-use crate::setup::Database;
+use crate::setup::{Database, MATERIAL_TEMPLATE};
 use crate::store::Addition;
 
 /// Put materials into the database: built-in ones or your own
@@ -48,12 +48,9 @@ pub(super) struct Args {
     foreign: foreign::DetailArgs,
 }
 
-/// A complete material.toml; docs/materials.md shows the same.
-pub(super) const TEMPLATE: &str = include_str!("add/template.toml");
-
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     if args.template {
-        return console.result(TEMPLATE, &json!({ "material_toml": TEMPLATE }));
+        return console.result(MATERIAL_TEMPLATE, &json!({ "material_toml": MATERIAL_TEMPLATE }));
     }
     args.foreign.check(&args.from)?;
     let mut names = args.names.clone();

@@ -47,9 +47,7 @@ pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
         domain.range_m[1],
         args.output.display()
     );
-    let value = json!({
-        "radar": radar, "chirps": chirps.rays.len(), "field_m": [field.min_m, field.max_m],
-        "f5_error": f5_error, "output": args.output.to_string_lossy(),
-    });
+    let mut value = report.record();
+    value["output"] = json!(args.output.to_string_lossy());
     console.result(&text, &value)
 }

@@ -3,6 +3,8 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use serde_json::{Value, json};
+
 use crate::error::Error;
 use crate::formats::figure::{Figure, Ink, Plot, Scale, Series, Style};
 use crate::formats::words::significant;
@@ -10,7 +12,7 @@ use crate::geometry::Raster;
 use crate::geometry::raster::Channel;
 use crate::radar::f5::{Domain, F5Deviation};
 use crate::radar::{Beam, Chirps, F5, Field, Radar};
-use crate::scene::{SceneError, SceneFile, read_regular, read_text};
+use crate::scene::{Scene, SceneError, SceneFile, read_regular, read_text};
 
 /// A radar with its scan and its polynomial.
 pub struct RadarReport {
@@ -35,11 +37,32 @@ impl RadarReport {
     /// An unknown preset, a scene file that cannot be read, a radar that cannot exist.
     pub fn open(wanted: &str) -> Result<RadarReport, Error> {
         let (radar, chirps) = load(wanted)?;
+        RadarReport::new(radar, chirps)
+    }
+
+    /// The radar of a scene.
+    ///
+    /// # Errors
+    /// A mirror that no polynomial follows.
+    pub fn of_scene(scene: &Scene) -> Result<RadarReport, Error> {
+        RadarReport::new(scene.radar().clone(), scene.chirps.clone())
+    }
+
+    fn new(radar: Radar, chirps: Chirps) -> Result<RadarReport, Error> {
         let domain = radar.f5_domain(&chirps.mirror);
         let f5 = radar.f5(domain)?;
         let f5_error = f5.error(&radar.mirror(), domain)?;
         let field = chirps.field(&radar.frames());
         Ok(RadarReport { radar, chirps, field, domain, f5, f5_error })
+    }
+
+    /// Its numbers, as `matdb radar --json` prints them.
+    pub fn record(&self) -> Value {
+        let RadarReport { radar, chirps, field, f5_error, .. } = self;
+        json!({
+            "radar": radar, "chirps": chirps.rays.len(), "field_m": [field.min_m, field.max_m],
+            "f5_error": f5_error,
+        })
     }
 
     /// Names and bytes of `scan.csv`, `scan.png`, `scan.svg`, `spot.csv`, `spot.png` and `f5.toml`.

@@ -16,6 +16,8 @@
 mod cloud;
 mod database;
 mod materials;
+mod new_files;
+mod new_material;
 mod new_scene;
 mod scene;
 mod validity;
@@ -27,6 +29,8 @@ pub use materials::{
     MaterialRevision, builtin_not_added, find_material, later_status_warning, status_warning,
     store_of_not_added, unknown_material,
 };
+pub use new_files::write_new;
+pub use new_material::{MATERIAL_TEMPLATE, new_material};
 pub use new_scene::{MadeScene, NewScene};
 pub use scene::{Assembly, ReadyScene, SceneMaterial, resolve_effects};
 pub use validity::{ValidityWarning, unmet_conditions, unmet_sentence};

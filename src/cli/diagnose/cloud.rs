@@ -7,6 +7,7 @@ use super::args::Args;
 use super::refusal::write_refusal;
 use crate::adopt::{
     CheckedRequest, CloudRequest, Earlier, Publication, PublicationResult, as_answer, name_beside,
+    scene_of_each,
 };
 use crate::cli::cloud::{CloudArgs, ColumnArgs};
 use crate::cli::console::Console;
@@ -14,7 +15,7 @@ use crate::cli::effects::chosen;
 use crate::diagnose::{DiagnoseError, Report};
 use crate::error::Error;
 use crate::files::{FilesError, Placement, WayOut, write_all};
-use crate::formats::words::{counted, listed};
+use crate::formats::words::listed;
 use crate::report::{CannotTell, shell_word};
 use crate::setup::{Database, USUAL_DATABASE};
 
@@ -28,7 +29,8 @@ pub(super) fn run(
     db: &Database,
     console: &Console,
 ) -> Result<(), Error> {
-    let scenes = scene_of_each(args)?;
+    let scenes: Vec<&Path> = args.scene.iter().map(PathBuf::as_path).collect();
+    let scenes = scene_of_each(&scenes, 1 + args.further.len())?;
     let further = args.further.iter().map(|path| path.as_path());
     let further: Vec<(&Path, &Path)> = further.zip(scenes.iter().skip(1).copied()).collect();
     let effects = if args.effects.is_empty() { Vec::new() } else { chosen(&args.effects)? };
@@ -53,20 +55,6 @@ pub(super) fn run(
     match diagnose(cloud, &args.columns, &checked, &notices, console) {
         Ok(report) => publish(&checked, &report, &notices, db, console),
         Err(error) => refuse(as_answer(error)?, &request, console),
-    }
-}
-
-/// The scene of each cloud.
-fn scene_of_each(args: &Args) -> Result<Vec<&Path>, Error> {
-    let clouds = 1 + args.further.len();
-    let scenes: Vec<&Path> = args.scene.iter().map(PathBuf::as_path).collect();
-    match scenes[..] {
-        [one] => Ok(vec![one; clouds]),
-        _ if scenes.len() == clouds => Ok(scenes),
-        _ => Err(Error::usage(
-            format!("{} for {}", counted(scenes.len(), "scene"), counted(clouds, "cloud")),
-            "give --scene once for each cloud, in the same order, or once for all",
-        )),
     }
 }
 

@@ -2,7 +2,6 @@
 
 mod material;
 mod scene;
-mod write;
 
 use clap::Subcommand;
 

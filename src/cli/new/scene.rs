@@ -4,14 +4,13 @@ use std::path::PathBuf;
 
 use serde_json::json;
 
-use super::write::write_new;
 use crate::cli::cloud::{CloudArgs, ColumnArgs, place};
 use crate::cli::console::Console;
 use crate::error::Error;
 use crate::files::folder_of;
 use crate::frames::{Global, Point};
 use crate::radar::Radar;
-use crate::setup::NewScene;
+use crate::setup::{NewScene, write_new};
 
 /// Write the scene of your own measurement: where the radar stood, its rays, the mesh
 #[derive(Debug, clap::Args)]
