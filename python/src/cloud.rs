@@ -79,8 +79,8 @@ impl CloudLike {
         }
     }
 
-    /// What the points are, for a record.
-    pub(crate) fn input(&self) -> Result<Input, Error> {
+    /// What the points are, for a record; `path` is their file or a name in its place.
+    pub(crate) fn input(&self, path: &Path) -> Result<Input, Error> {
         let bytes = match self {
             CloudLike::Cloud(cloud) | CloudLike::Simulated(cloud) => {
                 let points = cloud.get().cloud.points().iter();
@@ -90,9 +90,9 @@ impl CloudLike {
                 });
                 numbers.flat_map(f64::to_le_bytes).collect()
             }
-            CloudLike::File(path) => read_whole(path)?,
+            CloudLike::File(file) => read_whole(file)?,
         };
-        Ok(input(self.path(), &bytes))
+        Ok(input(path, &bytes))
     }
 }
 

@@ -3,22 +3,26 @@
 use std::path::{Path, PathBuf, absolute};
 
 use matdb::adopt::{
-    CheckedRequest, CloudRequest, Earlier, Publication, check_folder, input, moved_scene,
+    CheckedRequest, CloudRequest, Earlier, LoadedScene, Publication, PublicationResult,
+    check_folder, input, moved_scene, program, scene_of_each,
 };
+use matdb::diagnose::Report;
 use matdb::effects::{EffectList, find};
 use matdb::error::Error;
 use matdb::files::{folder_of, write_all};
+use matdb::material::Input;
 use matdb::report::EffectHelp;
 use matdb::setup::{self, ReadyScene};
+use matdb::store::Store;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyTuple};
+use pyo3::types::{PyBytes, PyList, PyTuple};
 use serde_json::{Value, json};
 
 use crate::cloud::CloudLike;
 use crate::database::Database;
 use crate::effect::Effect;
-use crate::error::{UsageError, raised};
+use crate::error::{UsageError, raised, warn};
 use crate::interrupt::interruptible;
 use crate::json::{of_text, text_of, to_python};
 use crate::scene::{Scene, SceneLike};
@@ -26,28 +30,51 @@ use crate::scene::{Scene, SceneLike};
 /// Name and bytes of a file.
 type File = (String, Vec<u8>);
 
-/// What a scene lacks to explain a cloud.
+/// What a scene lacks to explain a cloud, or a law to explain a curve.
 #[pyclass(frozen, module = "matdb")]
 pub(crate) struct Diagnosis {
-    record: Value,
+    pub(crate) record: Value,
     /// The report as one page that stands alone.
-    page: Vec<u8>,
+    pub(crate) page: Vec<u8>,
     /// The files for a folder. Scenes among them name others as seen from `from`.
-    files: Vec<File>,
+    pub(crate) files: Vec<File>,
     /// The folder in which the diagnosis was made.
-    from: PathBuf,
-    /// Cloud and scene, and the files that the scene names.
-    read: Vec<PathBuf>,
+    pub(crate) from: PathBuf,
+    /// Clouds and scenes, and the files that the scenes name.
+    pub(crate) read: Vec<PathBuf>,
+    /// Materials that were stored, with their revisions.
+    pub(crate) stored: Vec<String>,
+    /// The scenes with what was found and stored.
+    pub(crate) scenes_after: Vec<Py<Scene>>,
+}
+
+/// One argument, or a list of several.
+pub(crate) struct Several<T>(Vec<T>);
+
+impl<'py, T> FromPyObject<'_, 'py> for Several<T>
+where
+    T: for<'a> FromPyObject<'a, 'py, Error = PyErr>,
+{
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<Several<T>> {
+        if !given.is_instance_of::<PyList>() && !given.is_instance_of::<PyTuple>() {
+            return Ok(Several(vec![given.extract()?]));
+        }
+        let items = given.try_iter()?.map(|item| item?.extract());
+        Ok(Several(items.collect::<PyResult<_>>()?))
+    }
 }
 
 /// Finds the physical effects that a scene lacks to explain a measured cloud, on all cores. Ctrl-C ends it.
 ///
 /// Parameters
 /// ----------
-/// cloud : Cloud, Scan, str or os.PathLike
-///     The measured cloud, with a row of each detection.
-/// scene : Scene, str or os.PathLike
-///     The scene that was measured.
+/// cloud : Cloud, Scan, str or os.PathLike, or a list of them
+///     The measured cloud, with a row of each detection. Several clouds of the same target, of other poses or antennas or
+///     repeats, get one joint answer.
+/// scene : Scene, str or os.PathLike, or a list of them
+///     The scene that was measured: one for each cloud in the same order, or one for all.
 /// db : Database, optional
 ///     Where materials are looked for; without it, and for those that it does not have, the built-in ones.
 /// receiver : str, optional
@@ -59,6 +86,11 @@ pub(crate) struct Diagnosis {
 /// seed : int, default 0
 /// controls : bool, default True
 ///     Whether controls are computed, which take as long as the diagnosis.
+/// add : bool, default False
+///     Whether `db` stores what was found, and what was tried and not found, as new revisions of the materials: all of it or
+///     nothing, as `matdb diagnose --add` does. No file is written but the database: `scenes_after` are the changed scenes.
+/// material : str, optional
+///     The only material that receives what is found; all of the scene with 100 chirps or more unless stated.
 ///
 /// Returns
 /// -------
@@ -68,21 +100,42 @@ pub(crate) struct Diagnosis {
 /// ------
 /// matdb.DiagnoseError
 ///     Too few data, or data that are not of this scene.
+///
+/// Warns
+/// -----
+/// UserWarning
+///     Clouds that contradict each other, of which nothing is stored; with `add`, what is not stored, and materials that stay as
+///     they were.
 #[pyfunction]
-#[pyo3(signature = (cloud, scene, *, db = None, receiver = None, effects = Vec::new(), own_effects = Vec::new(), seed = 0, controls = true))]
+#[pyo3(signature = (cloud, scene, *, db = None, receiver = None, effects = Vec::new(), own_effects = Vec::new(), seed = 0,
+                    controls = true, add = false, material = None))]
 #[expect(clippy::too_many_arguments, reason = "each is a keyword in Python")]
 pub(crate) fn diagnose(
     py: Python<'_>,
-    cloud: CloudLike,
-    scene: SceneLike,
+    cloud: Several<CloudLike>,
+    scene: Several<SceneLike>,
     db: Option<&Database>,
     receiver: Option<&str>,
     effects: Vec<String>,
     own_effects: Vec<Py<Effect>>,
     seed: u64,
     controls: bool,
+    add: bool,
+    material: Option<&str>,
 ) -> PyResult<Diagnosis> {
-    let (scene, database) = (scene.scene(py)?, db.map(Database::database));
+    let database = db.map(Database::database);
+    if add && database.is_none() {
+        return Err(UsageError::new_err("add = True needs a database; give db = matdb.open()"));
+    }
+    let scenes = scene.0.into_iter().map(|scene| scene.scene(py)).collect::<PyResult<Vec<_>>>()?;
+    let (clouds, names) = (&cloud.0, &names(&cloud.0));
+    let scenes: Vec<&Scene> = scenes.iter().map(Py::get).collect();
+    let scenes = &scene_of_each(&scenes, clouds.len()).map_err(raised)?;
+    let pairs = std::iter::zip(names, scenes).map(|(name, scene)| (&**name, scene.path()));
+    let pairs: Vec<(&Path, &Path)> = pairs.collect();
+    let [(first, first_scene), further @ ..] = &pairs[..] else {
+        return Err(UsageError::new_err("there is no cloud; give one or more"));
+    };
     let effects = effects.iter().map(|name| {
         let unknown = || UsageError::new_err(format!("there is no effect `{name}` of clouds"));
         find(name).ok_or_else(unknown)
@@ -95,56 +148,151 @@ pub(crate) fn diagnose(
             return Err(UsageError::new_err(format!("{problem}; give one another name")));
         }
     }
-    let scene = scene.get();
-    let declared = scene.own_effects(py)?;
+    let declared = scenes.iter().map(|scene| scene.own_effects(py)).collect::<PyResult<Vec<_>>>()?;
+    let request = CloudRequest {
+        cloud: first,
+        scene: first_scene,
+        further,
+        receiver,
+        effects: &effects,
+        own_effects: &own,
+        material,
+        seed,
+        controls,
+        folder: Path::new(""),
+        add,
+    };
     let answer = interruptible(py, |stop| {
-        let request = CloudRequest {
-            cloud: cloud.path(),
-            scene: scene.path(),
-            further: &[],
-            receiver,
-            effects: &effects,
-            own_effects: &own,
-            material: None,
-            seed,
-            controls,
-            folder: Path::new(""),
-            add: false,
-        };
-        let checked = check(request, scene, declared, database.as_ref())?;
-        let given = vec![cloud.input()?, input(scene.path(), scene.own_text().as_bytes())];
-        let checked = CheckedRequest { given, ..checked };
-        let clouds = checked.read_clouds(|_, _| Ok(cloud.read()?.into_owned()))?;
-        let found = checked.diagnose(&clouds, &|_| stop.check())?;
-        let notices = checked.notices();
-        let words = ["matdb".to_owned(), "matdb diagnose".to_owned()];
-        let publication = Publication::new(&checked, &found, &notices, words);
-        let whole = |path: PathBuf| absolute(&path).unwrap_or(path);
-        Ok(Diagnosis {
-            record: json!(publication.report().record()),
-            page: publication.page_alone()?,
-            files: publication.files()?,
-            from: whole(PathBuf::from(".")),
-            read: checked.files_read().into_iter().map(whole).collect(),
-        })
+        let checked = check(request, scenes, declared, database.as_ref())?;
+        let checked = CheckedRequest { given: inputs(clouds, names, scenes)?, ..checked };
+        let read = checked.read_clouds(|path, _| {
+            let named = std::iter::zip(names, clouds).find(|(name, _)| *name == path);
+            let cloud = named.map_or(&clouds[0], |(_, cloud)| cloud);
+            Ok(cloud.read()?.into_owned())
+        })?;
+        let report = checked.diagnose(&read, &|_| stop.check())?;
+        Ok((checked, report))
     })?;
-    answer.map_err(raised::<Error>)
+    let (checked, report) = answer.map_err(raised::<Error>)?;
+    let (answer, scenes_after, notices) =
+        py.detach(|| publish(&checked, &report, scenes, database.as_ref())).map_err(raised)?;
+    warn(py, &notices)?;
+    let scenes_after = scenes_after.into_iter().map(|scene| Py::new(py, scene));
+    Ok(Diagnosis { scenes_after: scenes_after.collect::<PyResult<_>>()?, ..answer })
 }
 
-/// The request, of a scene with its materials.
+/// The files of clouds, or names in their place, each another one.
+fn names(clouds: &[CloudLike]) -> Vec<PathBuf> {
+    let mut names = Vec::new();
+    for (number, cloud) in (1..).zip(clouds) {
+        let name = cloud.path();
+        let is_plain = clouds.len() == 1 || matches!(cloud, CloudLike::File(_));
+        let numbered = || PathBuf::from(format!("{}-{number}", name.display()));
+        names.push(if is_plain { name.to_owned() } else { numbered() });
+    }
+    names
+}
+
+/// The request, of scenes with their materials.
 fn check<'a>(
     request: CloudRequest<'a>,
-    scene: &Scene,
-    declared: EffectList,
+    scenes: &[&Scene],
+    declared: Vec<EffectList>,
     database: Option<&setup::Database>,
 ) -> Result<CheckedRequest<'a>, Error> {
     let store = database.map(setup::Database::read).transpose()?.flatten();
-    let ready = ReadyScene::new(scene.scene().clone(), scene.path(), store.as_ref())?;
-    request.check_ready(
-        ready.with_own_effects(declared),
-        scene.own_text().to_owned(),
-        store.as_ref(),
-    )
+    let scenes = std::iter::zip(scenes, declared);
+    let mut loaded = scenes.map(|(scene, declared)| loaded(scene, declared, store.as_ref()));
+    let first = loaded.next().transpose()?;
+    let first = first.ok_or_else(|| Error::Usage {
+        problem: "there is no scene".to_owned(),
+        way_out: "give one for all clouds, or one for each".to_owned(),
+    })?;
+    request.check_ready(first, loaded.collect::<Result<_, _>>()?)
+}
+
+/// A scene with its materials and with its effects of the program's own.
+fn loaded(
+    scene: &Scene,
+    declared: EffectList,
+    store: Option<&Store>,
+) -> Result<LoadedScene, Error> {
+    let (path, text) = (scene.path().to_owned(), scene.own_text().to_owned());
+    let ready = ReadyScene::new(scene.scene().clone(), &path, store)?;
+    let ready = ready.with_own_effects(declared);
+    Ok(LoadedScene { path, ready, text })
+}
+
+/// What clouds and scenes are made of, each once and in the order of the command line.
+fn inputs(clouds: &[CloudLike], names: &[PathBuf], scenes: &[&Scene]) -> Result<Vec<Input>, Error> {
+    let mut known: Vec<(&Path, Input)> = Vec::new();
+    for ((cloud, name), scene) in clouds.iter().zip(names).zip(scenes) {
+        let of_cloud = cloud.input(name)?;
+        let is_file = matches!(cloud, CloudLike::File(_));
+        if !is_file && known.iter().any(|(_, other)| other.hash == of_cloud.hash) {
+            let problem = format!("the cloud {} is given twice", name.display());
+            return Err(Error::Usage { problem, way_out: "give each cloud once".to_owned() });
+        }
+        let path = scene.path();
+        for one in [(&**name, of_cloud), (path, input(path, scene.own_text().as_bytes()))] {
+            if !known.contains(&one) {
+                known.push(one);
+            }
+        }
+    }
+    Ok(known.into_iter().map(|(_, input)| input).collect())
+}
+
+/// The answer, its scenes with what was found, and what a person should not overlook. Stores what was found, if that was asked
+/// for.
+fn publish(
+    checked: &CheckedRequest,
+    report: &Report,
+    scenes: &[&Scene],
+    database: Option<&setup::Database>,
+) -> Result<(Diagnosis, Vec<Scene>, Vec<String>), Error> {
+    let notices = checked.notices();
+    let program = database.map_or_else(|| "matdb".to_owned(), program);
+    let command = format!("{program} diagnose");
+    let publication = Publication::new(checked, report, &notices, [program, command]);
+    let contradiction = publication.report().contradiction();
+    let (record, page) = (json!(publication.report().record()), publication.page_alone()?);
+    let (published, scenes_after, publication) = match database {
+        Some(database) if checked.request.add && contradiction.is_none() => {
+            let (publication, mut store) = (publication.with_scenes_in_folder(), database.write()?);
+            let places = publication.cloud_of_each_scene();
+            let (published, scenes_after) = publication.store(&mut store, |_, beside| {
+                let mut after = Vec::new();
+                for ((folder, files), place) in beside.iter().zip(places) {
+                    for (name, text) in files {
+                        let text = String::from_utf8_lossy(text).into_owned();
+                        after.push(scenes[place].with_file(text, folder.join(name))?);
+                    }
+                }
+                Ok(after)
+            })?;
+            (published, scenes_after, publication)
+        }
+        _ => {
+            let files = publication.files()?;
+            (PublicationResult { files, ..PublicationResult::default() }, Vec::new(), publication)
+        }
+    };
+    let mut notices = Vec::from_iter(contradiction);
+    if checked.request.add {
+        notices.extend(publication.notices());
+    }
+    let whole = |path: PathBuf| absolute(&path).unwrap_or(path);
+    let answer = Diagnosis {
+        record,
+        page,
+        files: published.files,
+        from: whole(PathBuf::from(".")),
+        read: checked.files_read().into_iter().map(whole).collect(),
+        stored: published.stored,
+        scenes_after: Vec::new(),
+    };
+    Ok((answer, scenes_after, notices))
 }
 
 /// The physical effects that `diagnose` looks for: what each is, how it shows, and its numbers, as `matdb effects --json` prints
@@ -214,6 +362,19 @@ impl Diagnosis {
         self.value(py, "/error/after")
     }
 
+    /// Materials that were stored, as `NAME@REVISION`; empty without `add`.
+    #[getter]
+    fn stored(&self) -> &[String] {
+        &self.stored
+    }
+
+    /// The scenes with what was found and stored, each once: with the effects of the scene and of the radar, and the new revisions
+    /// of the materials. Render them with the database. Empty without `add`, and where nothing was found.
+    #[getter]
+    fn scenes_after(&self, py: Python<'_>) -> Vec<Py<Scene>> {
+        self.scenes_after.iter().map(|scene| scene.clone_ref(py)).collect()
+    }
+
     /// All of it, as `report.json` has it.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         to_python(py, &self.record)
@@ -257,6 +418,8 @@ impl Diagnosis {
         files: Vec<(String, Bound<'_, PyBytes>)>,
         from_folder: PathBuf,
         read: Vec<PathBuf>,
+        stored: Vec<String>,
+        scenes_after: Vec<Py<Scene>>,
     ) -> PyResult<Diagnosis> {
         let files = files.into_iter().map(|(name, bytes)| (name, bytes.as_bytes().to_vec()));
         Ok(Diagnosis {
@@ -265,14 +428,18 @@ impl Diagnosis {
             files: files.collect(),
             from: from_folder,
             read,
+            stored,
+            scenes_after,
         })
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
-        let (py, Diagnosis { record, page, files, from, read }) = (slf.py(), slf.get());
+        let (py, own) = (slf.py(), slf.get());
+        let Diagnosis { record, page, files, from, read, stored, .. } = own;
         let files = files.iter().map(|(name, bytes)| (name, PyBytes::new(py, bytes)));
         let page = PyBytes::new(py, page);
-        let parts = (text_of(record)?, page, Vec::from_iter(files), from, read);
+        let (files, scenes_after) = (Vec::from_iter(files), own.scenes_after(py));
+        let parts = (text_of(record)?, page, files, from, read, stored, scenes_after);
         (slf.get_type().getattr("_of_parts")?, parts).into_pyobject(py)
     }
 }

@@ -4,9 +4,11 @@
 #![warn(missing_docs)]
 
 mod arrow;
+mod begin;
 mod cloud;
 mod command;
 mod compare;
+mod curve;
 mod database;
 mod diagnose;
 mod effect;
@@ -28,11 +30,15 @@ mod _matdb {
     use pyo3::prelude::*;
 
     #[pymodule_export]
+    use crate::begin::{Radar, new_material, new_scene, radar};
+    #[pymodule_export]
     use crate::cloud::Cloud;
     #[pymodule_export]
     use crate::command::_run;
     #[pymodule_export]
     use crate::compare::{Comparison, calibrate, compare};
+    #[pymodule_export]
+    use crate::curve::diagnose_curve;
     #[pymodule_export]
     use crate::database::{Database, open, verify};
     #[pymodule_export]

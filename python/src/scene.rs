@@ -86,6 +86,16 @@ impl Scene {
         Ok(Scene { text, path, scene, given, effects: self.effects_again(py) })
     }
 
+    /// This scene with another text and another file in the same folder.
+    pub(crate) fn with_file(
+        &self,
+        text: String,
+        path: PathBuf,
+    ) -> Result<Scene, matdb::error::Error> {
+        let scene = self.scene.replace(parse(&text, &path)?, &path, &self.given)?;
+        Ok(Scene { text, path, scene, given: self.given.clone() })
+    }
+
     fn table(&self) -> PyResult<Table> {
         let unreadable = |error: toml::de::Error| UsageError::new_err(error.to_string());
         self.text.parse().map_err(unreadable)

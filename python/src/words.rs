@@ -1,13 +1,15 @@
 //! Sentences of the command line as Python says them.
 
 /// Keywords of flags that have another name.
-const KEYWORDS: [(&str, &str); 8] = [
+const KEYWORDS: [(&str, &str); 10] = [
     ("alpha", "fixed"),
     ("class", "material_class"),
     ("edge-margin", "edge_margin_m"),
     ("fix", "fixed"),
     ("frequency", "frequency_ghz"),
     ("limit", "most"),
+    ("look-at", "look_at_m"),
+    ("radar-at", "radar_at_m"),
     ("threshold", "threshold_dbm"),
     ("within", "within_db"),
 ];
@@ -67,6 +69,9 @@ fn value(text: &str) -> (&str, &str) {
 fn literal(value: &str) -> String {
     if value.starts_with('"') || value.parse::<f64>().is_ok() {
         return value.to_owned();
+    }
+    if value.split(',').all(|number| number.parse::<f64>().is_ok()) {
+        return format!("({})", value.replace(',', ", "));
     }
     if !value.contains('=') {
         return format!("\"{value}\"");

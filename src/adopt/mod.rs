@@ -35,12 +35,12 @@ pub use fitted_material::FittedMaterial;
 pub use material_files::{AddedMaterial, NewMaterials, foreign_format};
 pub use measurement::{MeasurementStorage, StoredMeasurement};
 pub use provenance::{activity, add_source, input};
-pub use publication::{Publication, PublicationResult};
+pub use publication::{Publication, PublicationResult, program};
 pub use recipients::{
     Adoption, Recipient, check_recipients, find_recipient, pinned_name, replaced_name,
 };
 pub use removal::{Removal, remove_materials};
-pub use request::{CheckedRequest, CloudRequest, FurtherScene, as_answer, scene_of_each};
+pub use request::{CheckedRequest, CloudRequest, LoadedScene, as_answer, scene_of_each};
 pub use scene_after::{
     AFTER, MARK, check_beside, moved_scene, name_beside, relocate_files, scene_with_found,
 };

@@ -17,6 +17,7 @@ use crate::formats::words::listed;
 use crate::material::{Activity, Material, file};
 use crate::report::{CloudAnswer, CloudReport, NextSteps, shell_word};
 use crate::scene::{Scene, SceneFile};
+use crate::setup::{Database, USUAL_DATABASE};
 use crate::store::{Addition, Store};
 
 /// First line of a material's file.
@@ -395,6 +396,15 @@ impl DiagnosedScene<'_> {
             )
         })?;
         Ok((head.to_owned() + &text).into_bytes())
+    }
+}
+
+/// The program with its database, where that is not the usual one.
+pub fn program(db: &Database) -> String {
+    if db.path() == Path::new(USUAL_DATABASE) {
+        "matdb".to_owned()
+    } else {
+        format!("matdb --db {}", shell_word(db.path()))
     }
 }
 

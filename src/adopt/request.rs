@@ -66,7 +66,7 @@ pub struct CheckedRequest<'a> {
     /// Text of the scene file.
     pub scene_text: String,
     /// The scenes of the further clouds.
-    pub further: Vec<FurtherScene>,
+    pub further: Vec<LoadedScene>,
     /// The material that alone receives what is found, as its place among those of the scene.
     pub recipient: Option<usize>,
     /// Effects to try, and the others.
@@ -75,8 +75,8 @@ pub struct CheckedRequest<'a> {
     pub given: Vec<Input>,
 }
 
-/// The scene of a further cloud.
-pub struct FurtherScene {
+/// A scene of a request.
+pub struct LoadedScene {
     /// Its file.
     pub path: PathBuf,
     /// The scene with its materials.
@@ -85,11 +85,11 @@ pub struct FurtherScene {
     pub text: String,
 }
 
-impl FurtherScene {
-    fn load(path: &Path, store: Option<&Store>) -> Result<FurtherScene, Error> {
+impl LoadedScene {
+    fn load(path: &Path, store: Option<&Store>) -> Result<LoadedScene, Error> {
         let text = read_text(path)?;
         let ready = ReadyScene::new(Scene::load(path)?, path, store)?;
-        Ok(FurtherScene { path: path.to_owned(), ready, text })
+        Ok(LoadedScene { path: path.to_owned(), ready, text })
     }
 }
 
@@ -132,10 +132,10 @@ impl<'a> CloudRequest<'a> {
     /// A scene that cannot be loaded or declares what no diagnosis predicts; a folder with files of somebody else;
     /// effects or a material that do not suit the scene.
     pub fn check(self, store: Option<&Store>) -> Result<CheckedRequest<'a>, Error> {
-        let FurtherScene { ready, text, .. } = FurtherScene::load(self.scene, store)?;
-        let further = self.further.iter().map(|(_, path)| FurtherScene::load(path, store));
+        let first = LoadedScene::load(self.scene, store)?;
+        let further = self.further.iter().map(|(_, path)| LoadedScene::load(path, store));
         let further = further.collect::<Result<_, _>>()?;
-        let checked = self.check_ready(ready, text, further)?;
+        let checked = self.check_ready(first, further)?;
         checked.check_output()?;
         Ok(checked)
     }
@@ -147,14 +147,14 @@ impl<'a> CloudRequest<'a> {
     /// As [`CloudRequest::check`].
     pub fn check_ready(
         self,
-        ready: ReadyScene,
-        scene_text: String,
-        further: Vec<FurtherScene>,
+        first: LoadedScene,
+        further: Vec<LoadedScene>,
     ) -> Result<CheckedRequest<'a>, Error> {
+        let LoadedScene { ready, text: scene_text, .. } = first;
         let antenna = self.receiver.map(|name| self.antenna(&ready.scene, name)).transpose()?;
         check_predicted(&ready.scene, self.scene, antenna)?;
         check_declared(&ready, self.scene, antenna)?;
-        for FurtherScene { path, ready, .. } in &further {
+        for LoadedScene { path, ready, .. } in &further {
             check_predicted(&ready.scene, path, None)?;
             check_declared(ready, path, None)?;
         }
@@ -207,7 +207,7 @@ impl<'a> CloudRequest<'a> {
     }
 
     /// Checks that several clouds differ and that their scenes have the same regions of the same materials.
-    fn check_together(&self, first: &ReadyScene, further: &[FurtherScene]) -> Result<(), Error> {
+    fn check_together(&self, first: &ReadyScene, further: &[LoadedScene]) -> Result<(), Error> {
         if self.further.len() >= MOST_CLOUDS {
             return Err(Error::usage(
                 format!("{} clouds are more than {MOST_CLOUDS}", self.further.len() + 1),

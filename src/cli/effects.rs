@@ -37,13 +37,9 @@ pub(super) fn chosen(names: &[String]) -> Result<Vec<&'static dyn Effect>, Error
     if names.is_empty() {
         return Ok(library().to_vec());
     }
-    each_once(names).map(|name| known(name)).collect()
-}
-
-/// Names without those that were given before.
-pub(super) fn each_once(names: &[String]) -> impl Iterator<Item = &String> {
     let numbered = names.iter().enumerate();
-    numbered.filter(|(index, name)| !names[..*index].contains(name)).map(|(_, name)| name)
+    let each_once = numbered.filter(|(index, name)| !names[..*index].contains(name));
+    each_once.map(|(_, name)| known(name)).collect()
 }
 
 fn known(name: &str) -> Result<&'static dyn Effect, Error> {

@@ -35,7 +35,7 @@ pub use cannot_tell::CannotTell;
 pub use choice::{Choice, Measurands, Reason, UntriedEffect, terms_not_asked};
 pub use cloud::{CloudAnswer, CloudRecord, CloudReport, NextSteps};
 pub use comparison::Comparison;
-pub use curve::{CurveAnswer, CurveRequest};
+pub use curve::{CurveAnswer, CurveRequest, curve_law, curve_terms};
 pub use effect_help::EffectHelp;
 pub use fit_plot::FitPlot;
 pub use history::{RevisionRecord, revision_records};

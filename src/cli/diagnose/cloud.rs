@@ -7,7 +7,7 @@ use super::args::Args;
 use super::refusal::write_refusal;
 use crate::adopt::{
     CheckedRequest, CloudRequest, Earlier, Publication, PublicationResult, as_answer, name_beside,
-    scene_of_each,
+    program, scene_of_each,
 };
 use crate::cli::cloud::{CloudArgs, ColumnArgs};
 use crate::cli::console::Console;
@@ -17,7 +17,7 @@ use crate::error::Error;
 use crate::files::{FilesError, Placement, WayOut, write_all};
 use crate::formats::words::listed;
 use crate::report::{CannotTell, shell_word};
-use crate::setup::{Database, USUAL_DATABASE};
+use crate::setup::Database;
 
 /// The folder of a scene, and the files for it.
 type Beside<'a> = (&'a Path, Vec<(String, Vec<u8>)>);
@@ -211,15 +211,6 @@ fn other_scenes(replaced: &[String]) -> String {
         listed(&names),
         listed(replaced)
     )
-}
-
-/// The program with its database, where that is not the usual one.
-fn program(db: &Database) -> String {
-    if db.path() == Path::new(USUAL_DATABASE) {
-        "matdb".to_owned()
-    } else {
-        format!("matdb --db {}", shell_word(db.path()))
-    }
 }
 
 /// The program with these arguments, as a shell takes it, and with its database, which a variable may have named.

@@ -5,22 +5,20 @@ use std::path::Path;
 use super::args::Args;
 use super::refusal::write_refusal;
 use crate::adopt::{Earlier, check_folder};
-use crate::brdf::Brdf;
 use crate::cli::console::Console;
-use crate::cli::effects::each_once;
-use crate::diagnose::curve::{CurveDiagnoseError, CurveReport, Term, term, terms};
+use crate::diagnose::curve::{CurveDiagnoseError, CurveReport, Term};
 use crate::error::Error;
 use crate::files::{read_small, write_all};
-use crate::fit::{model, model_names};
-use crate::formats::text::nearest;
-use crate::report::{CannotTell, CurveAnswer, CurveRequest, terms_not_asked};
+use crate::report::{
+    CannotTell, CurveAnswer, CurveRequest, curve_law, curve_terms, terms_not_asked,
+};
 
 /// Diagnoses the curve of a file and writes the answer.
 pub(super) fn run(path: &Path, args: &Args, console: &Console) -> Result<(), Error> {
     check_folder(&args.output, &[path], &[])?;
     let bytes = read_small(path)?;
-    let law = law(args.model.as_deref())?;
-    let effects = chosen(&args.effects)?;
+    let law = args.model.as_deref().map(curve_law).transpose()?;
+    let effects = curve_terms(&args.effects)?;
     let request = CurveRequest {
         path,
         columns: &args.columns.names(),
@@ -76,29 +74,4 @@ fn refuse(
     let answer = CannotTell::of_curve(&error);
     write_refusal(&answer, &format!("the curve {curve}"), folder, &[path], console)?;
     Err(Error::CurveDiagnosis { curve, error })
-}
-
-fn law(name: Option<&str>) -> Result<Option<Brdf>, Error> {
-    let Some(name) = name else { return Ok(None) };
-    let law = model(name).ok_or_else(|| {
-        let names: Vec<&str> = model_names().collect();
-        unknown("model", name, &names)
-    })?;
-    Ok(Some(law))
-}
-
-fn chosen(names: &[String]) -> Result<Vec<&'static dyn Term>, Error> {
-    if names.is_empty() {
-        return Ok(terms().to_vec());
-    }
-    let known: Vec<&str> = terms().iter().map(|term| term.name()).collect();
-    each_once(names).map(|name| term(name).ok_or_else(|| unknown("effect", name, &known))).collect()
-}
-
-fn unknown(what: &str, name: &str, known: &[&str]) -> Error {
-    let way_out = match nearest(name, known.iter().copied()) {
-        Some(near) => format!("did you mean `{near}`?"),
-        None => format!("choose {}", known.join(", ")),
-    };
-    Error::usage(format!("a curve has no {what} `{name}`"), way_out)
 }

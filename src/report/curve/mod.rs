@@ -14,7 +14,7 @@ use crate::diagnose::curve::CurveReport;
 use crate::error::Error;
 
 pub use answer::CurveAnswer;
-pub use request::CurveRequest;
+pub use request::{CurveRequest, curve_law, curve_terms};
 
 impl CurveAnswer<'_> {
     /// `report.html`, `report.json`, `residuals.csv`, `curve.svg` and `curve.png`.

@@ -3,8 +3,12 @@
 use std::path::Path;
 
 use crate::brdf::Brdf;
-use crate::diagnose::curve::{CurveDiagnosis, CurveReport, Points, Term, base_law, is_grazing};
+use crate::diagnose::curve::{
+    CurveDiagnosis, CurveReport, Points, Term, base_law, is_grazing, term, terms,
+};
 use crate::error::Error;
+use crate::fit::{model, model_names};
+use crate::formats::text::nearest;
 use crate::formats::{ColumnNames, FormatError};
 use crate::material::file::in_plane::{is_bsdf, read_bsdf};
 use crate::material::file::points;
@@ -25,6 +29,43 @@ pub struct CurveRequest<'a> {
     pub effects: &'a [&'static dyn Term],
     /// Seed of everything random.
     pub seed: u64,
+}
+
+/// The law of this name, to compare a curve with.
+///
+/// # Errors
+/// There is none; the error names one that may be meant.
+pub fn curve_law(name: &str) -> Result<Brdf, Error> {
+    model(name).ok_or_else(|| unknown("model", name, &model_names().collect::<Vec<_>>()))
+}
+
+/// The effects of curves of these names, each once; all of them without any.
+///
+/// # Errors
+/// The first name that no effect has.
+pub fn curve_terms(names: &[String]) -> Result<Vec<&'static dyn Term>, Error> {
+    if names.is_empty() {
+        return Ok(terms().to_vec());
+    }
+    let mut chosen: Vec<&'static dyn Term> = Vec::new();
+    for name in names {
+        let Some(found) = term(name) else {
+            let known: Vec<&str> = terms().iter().map(|term| term.name()).collect();
+            return Err(unknown("effect", name, &known));
+        };
+        if chosen.iter().all(|other| other.name() != found.name()) {
+            chosen.push(found);
+        }
+    }
+    Ok(chosen)
+}
+
+fn unknown(what: &str, name: &str, known: &[&str]) -> Error {
+    let way_out = match nearest(name, known.iter().copied()) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => format!("choose {}", known.join(", ")),
+    };
+    Error::usage(format!("a curve has no {what} `{name}`"), way_out)
 }
 
 impl CurveRequest<'_> {
