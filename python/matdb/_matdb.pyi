@@ -25,6 +25,7 @@ __all__ = [
     "MaterialError",
     "Measurement",
     "Page",
+    "Radar",
     "RenderError",
     "Scan",
     "Scene",
@@ -39,11 +40,15 @@ __all__ = [
     "calibrate",
     "compare",
     "diagnose",
+    "diagnose_curve",
     "effects",
     "fit",
     "load_scene",
     "measure",
+    "new_material",
+    "new_scene",
     "open",
+    "radar",
     "render",
     "verify",
 ]
@@ -535,6 +540,10 @@ class Diagnosis:
     def before(self) -> _Record: ...
     @property
     def after(self) -> _Record: ...
+    @property
+    def stored(self) -> list[str]: ...
+    @property
+    def scenes_after(self) -> list[Scene]: ...
     def to_dict(self) -> _Record: ...
     def report(self, path: _Name) -> None: ...
     def save(self, folder: _Name) -> None: ...
@@ -545,11 +554,13 @@ class Diagnosis:
         files: Sequence[tuple[str, bytes]],
         from_folder: _Name,
         read: Sequence[_Name],
+        stored: Sequence[str],
+        scenes_after: Sequence[Scene],
     ) -> Diagnosis: ...
 
 def diagnose(
-    cloud: Cloud | Scan | _Name,
-    scene: Scene | _Name,
+    cloud: Cloud | Scan | _Name | Sequence[Cloud | Scan | _Name],
+    scene: Scene | _Name | Sequence[Scene | _Name],
     *,
     db: Database | None = None,
     receiver: str | None = None,
@@ -557,6 +568,19 @@ def diagnose(
     own_effects: Sequence[Effect] = ...,
     seed: int = 0,
     controls: bool = True,
+    add: bool = False,
+    material: str | None = None,
+) -> Diagnosis: ...
+def diagnose_curve(
+    what: Measurement | Material | _Name,
+    *,
+    db: Database | None = None,
+    model: str | None = None,
+    noise_db: float | None = None,
+    effects: Sequence[str] = ...,
+    curve: str | None = None,
+    columns: Mapping[str, str] | None = None,
+    seed: int = 0,
 ) -> Diagnosis: ...
 def effects(name: str | None = None) -> list[_Record]: ...
 def render(
@@ -572,4 +596,25 @@ def render(
     uncompressed: bool = False,
     tracer: Literal["pinhole", "bvh", "brute", "gpu"] | None = None,
 ) -> Scan: ...
+@final
+class Radar:
+    def to_dict(self) -> _Record: ...
+    @property
+    def notices(self) -> list[str]: ...
+    def save(self, folder: _Name) -> None: ...
+    def _repr_png_(self) -> bytes: ...
+    @staticmethod
+    def _of_parts(record: str, files: Sequence[tuple[str, bytes]], notices: Sequence[str]) -> Radar: ...
+
+def radar(radar: Scene | _Name) -> Radar: ...
+def new_scene(
+    cloud: Cloud | Scan | _Name,
+    mesh: _Name,
+    path: _Name = ...,
+    *,
+    radar_at_m: Sequence[float] | None = None,
+    look_at_m: Sequence[float] | None = None,
+    frequency_ghz: float = 300.0,
+) -> Scene: ...
+def new_material(name: str, folder: _Name | None = None) -> Path: ...
 def _run(words: Sequence[_Name]) -> int: ...

@@ -6,6 +6,7 @@ use matdb::adopt::FitSubject;
 use matdb::error::Error;
 use matdb::files::read_small;
 use matdb::formats::ColumnNames;
+use matdb::measure::Curve;
 use matdb::report::{CurveAnswer, CurveRequest, curve_law, curve_terms, terms_not_asked};
 use matdb::setup::find_material;
 use pyo3::prelude::*;
@@ -71,11 +72,14 @@ pub(crate) fn diagnose_curve(
     let diagnosed = py.detach(|| {
         let law = model.map(curve_law).transpose()?;
         let effects = curve_terms(&effects)?;
-        let CurveFile { name, bytes, read } = CurveFile::of(&what, curve, db)?;
+        let (name, levels) = levels_of(&what, curve, db)?;
         let path = Path::new(&name);
         let (columns, law) = (&columns, law.as_ref());
         let request = CurveRequest { path, columns, law, noise_db, effects: &effects, seed };
-        let (report, notices) = request.diagnose(&bytes)?;
+        let (report, notices) = match &levels {
+            Levels::File(bytes) => request.diagnose(bytes)?,
+            Levels::Curve(curve) => request.diagnose_curve(curve, &[])?,
+        };
         let not_tried = &terms_not_asked(&effects);
         let answer = CurveAnswer { report: &report, name: &name, model, seed, not_tried };
         let files = answer.files()?;
@@ -85,7 +89,7 @@ pub(crate) fn diagnose_curve(
             page: page.map(|(_, page)| page.clone()).unwrap_or_default(),
             files,
             from: PathBuf::new(),
-            read,
+            read: absolute(path).into_iter().filter(|whole| whole.is_file()).collect(),
             stored: Vec::new(),
             scenes_after: Vec::new(),
         };
@@ -96,36 +100,38 @@ pub(crate) fn diagnose_curve(
     Ok(diagnosis)
 }
 
-/// The file of a curve.
-struct CurveFile {
-    /// Its path, or a name in its place.
-    name: String,
-    bytes: Vec<u8>,
-    /// Its whole path; empty where there is no file.
-    read: Vec<PathBuf>,
+/// Where the levels of a curve come from.
+enum Levels {
+    /// The bytes of its file.
+    File(Vec<u8>),
+    /// A curve of a material.
+    Curve(Curve),
 }
 
-impl CurveFile {
-    /// The file itself, or what it would be.
-    fn of(what: &What, curve: Option<&str>, db: Option<&Database>) -> Result<CurveFile, Error> {
-        let subject = match what {
-            What::Named(name) => {
-                let path = Path::new(name);
-                if name.ends_with(".csv") || name.ends_with(".bsdf") || path.is_file() {
-                    let whole = absolute(path).unwrap_or_else(|_| path.to_owned());
-                    let bytes = read_small(path)?;
-                    return Ok(CurveFile { name: name.clone(), bytes, read: vec![whole] });
-                }
-                let store = db.map_or(Ok(None), Database::read)?;
-                FitSubject::of_material(name, curve, find_material(store.as_ref(), name, "")?)?
+/// The path of a curve or a name in its place, and its levels.
+fn levels_of(
+    what: &What,
+    curve: Option<&str>,
+    db: Option<&Database>,
+) -> Result<(String, Levels), Error> {
+    let subject = match what {
+        What::Named(name) => {
+            let path = Path::new(name);
+            if name.ends_with(".csv") || name.ends_with(".bsdf") || path.is_file() {
+                return Ok((name.clone(), Levels::File(read_small(path)?)));
             }
-            What::Measured(measured) => measured.get().subject().0,
-            What::Material(material) => {
-                let found = material.get().found().clone();
-                FitSubject::of_material(&found.material.slug.to_string(), curve, found)?
-            }
-        };
-        let bytes = subject.curve.write();
-        Ok(CurveFile { name: subject.label, bytes, read: Vec::new() })
-    }
+            let store = db.map_or(Ok(None), Database::read)?;
+            FitSubject::of_material(name, curve, find_material(store.as_ref(), name, "")?)?
+        }
+        What::Measured(measured) => {
+            let (subject, _) = measured.get().subject();
+            // What it saves is rounded.
+            return Ok((subject.label, Levels::File(subject.curve.write())));
+        }
+        What::Material(material) => {
+            let found = material.get().found().clone();
+            FitSubject::of_material(&found.material.slug.to_string(), curve, found)?
+        }
+    };
+    Ok((subject.label, Levels::Curve(subject.curve)))
 }

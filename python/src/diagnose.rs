@@ -12,7 +12,7 @@ use matdb::error::Error;
 use matdb::files::{folder_of, write_all};
 use matdb::material::Input;
 use matdb::report::EffectHelp;
-use matdb::setup::{self, ReadyScene};
+use matdb::setup::ReadyScene;
 use matdb::store::Store;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -123,8 +123,7 @@ pub(crate) fn diagnose(
     add: bool,
     material: Option<&str>,
 ) -> PyResult<Diagnosis> {
-    let database = db.map(Database::database);
-    if add && database.is_none() {
+    if add && db.is_none() {
         return Err(UsageError::new_err("add = True needs a database; give db = matdb.open()"));
     }
     let scenes = scene.0.into_iter().map(|scene| scene.scene(py)).collect::<PyResult<Vec<_>>>()?;
@@ -163,7 +162,7 @@ pub(crate) fn diagnose(
         add,
     };
     let answer = interruptible(py, |stop| {
-        let checked = check(request, scenes, declared, database.as_ref())?;
+        let checked = check(request, scenes, declared, db)?;
         let checked = CheckedRequest { given: inputs(clouds, names, scenes)?, ..checked };
         let read = checked.read_clouds(|path, _| {
             let named = std::iter::zip(names, clouds).find(|(name, _)| *name == path);
@@ -175,7 +174,7 @@ pub(crate) fn diagnose(
     })?;
     let (checked, report) = answer.map_err(raised::<Error>)?;
     let (answer, scenes_after, notices) =
-        py.detach(|| publish(&checked, &report, scenes, database.as_ref())).map_err(raised)?;
+        py.detach(|| publish(&checked, &report, scenes, db)).map_err(raised)?;
     warn(py, &notices)?;
     let scenes_after = scenes_after.into_iter().map(|scene| Py::new(py, scene));
     Ok(Diagnosis { scenes_after: scenes_after.collect::<PyResult<_>>()?, ..answer })
@@ -198,9 +197,9 @@ fn check<'a>(
     request: CloudRequest<'a>,
     scenes: &[&Scene],
     declared: Vec<EffectList>,
-    database: Option<&setup::Database>,
+    db: Option<&Database>,
 ) -> Result<CheckedRequest<'a>, Error> {
-    let store = database.map(setup::Database::read).transpose()?.flatten();
+    let store = db.map_or(Ok(None), Database::read)?;
     let scenes = std::iter::zip(scenes, declared);
     let mut loaded = scenes.map(|(scene, declared)| loaded(scene, declared, store.as_ref()));
     let first = loaded.next().transpose()?;
@@ -249,10 +248,11 @@ fn publish(
     checked: &CheckedRequest,
     report: &Report,
     scenes: &[&Scene],
-    database: Option<&setup::Database>,
+    db: Option<&Database>,
 ) -> Result<(Diagnosis, Vec<Scene>, Vec<String>), Error> {
     let notices = checked.notices();
-    let program = database.map_or_else(|| "matdb".to_owned(), program);
+    let database = db.map(Database::database);
+    let program = database.as_ref().map_or_else(|| "matdb".to_owned(), program);
     let command = format!("{program} diagnose");
     let publication = Publication::new(checked, report, &notices, [program, command]);
     let contradiction = publication.report().contradiction();

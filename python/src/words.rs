@@ -15,7 +15,7 @@ const KEYWORDS: [(&str, &str); 10] = [
 ];
 
 /// What stands behind a flag and is not its value.
-const WORDS: [&str; 6] = ["and", "at", "or", "out", "states", "where"];
+const WORDS: [&str; 7] = ["and", "at", "once", "or", "out", "states", "where"];
 
 /// A sentence with keywords in the place of flags: `unit="mm"` for `--unit mm`. What stands in backticks is a command and
 /// stays.

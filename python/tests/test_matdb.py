@@ -1097,3 +1097,248 @@ def test_a_scan_is_logged_to_rerun(scene):
     scan.to_rerun("plate")
     rr.disconnect()
     assert Path("scan.rrd").stat().st_size > 1000
+
+
+TILTED = SCENE.replace("= 12", "= 18").replace('file = "builtin:plate"', 'file = "builtin:plate"\nrotation_deg = [0, 8, 0]')
+DRIFT = '[[radar.effect]]\nname = "drift"\nslope_db = 8.0\n'
+
+
+@pytest.fixture
+def drifting(tmp_path, monkeypatch):
+    """Two clouds of one plate, whose radar drifts as the scenes do not say."""
+    monkeypatch.chdir(tmp_path)
+    for name, scene, seed in [("a", TILTED, 5), ("b", TILTED.replace("[0, 8, 0]", "[0, -6, 0]"), 6)]:
+        Path(f"{name}.toml").write_text(scene)
+        Path("drifting.toml").write_text(scene + DRIFT)
+        md.render("drifting.toml", seed=seed).save("out")
+        Path(f"{name}.ply").write_bytes(Path("out/cloud.ply").read_bytes())
+    return {"effects": ["drift", "compression"], "controls": False}
+
+
+# Flags of the command for the settings of the fixture.
+QUICK = ["--effects", "drift,compression", "--no-controls"]
+
+
+def test_several_clouds_are_diagnosed_as_by_the_command_line(drifting, tmp_path):
+    why = md.diagnose(["a.ply", "b.ply"], ["a.toml", "b.toml"], **drifting)
+    said = said_by_command(tmp_path, "diagnose", "a.ply", "b.ply", "--scene", "a.toml", "--scene", "b.toml", "-o", "by-command",
+                           *QUICK)
+    assert why.to_dict() == said and [cloud["name"] for cloud in said["clouds"]] == ["a.ply", "b.ply"]
+    assert [effect["name"] for effect in why.effects] == ["drift"]
+    why.save("why")
+    of_words = ["report.html"]  # it names the folder
+    by_hand, by_command = files("why"), files("by-command")
+    assert by_hand.keys() == by_command.keys() and {"after.toml", "after-2.toml"} < by_hand.keys()
+    assert all(by_hand[name] == by_command[name] for name in by_hand if name not in of_words)
+    # Objects, among them two scenes of one file.
+    a = md.load_scene("a.toml")
+    b = a.replace(mesh=md.load_scene("b.toml").to_dict()["mesh"])
+    again = md.diagnose([md.Cloud.load("a.ply"), md.Cloud.load("b.ply")], (a, b), **drifting)
+    assert [cloud["name"] for cloud in again.to_dict()["clouds"]] == ["points-1", "points-2"]
+    assert again.effects == why.effects and again.after == why.after
+    again.save("again")
+    assert "-6" in Path("again/after-2.toml").read_text() and "-6" not in Path("again/after.toml").read_text()
+    # One scene for all repeats.
+    md.render("drifting.toml", seed=9).save("repeat")
+    repeats = md.diagnose(["b.ply", "repeat/cloud.ply"], "b.toml", **drifting)
+    repeats.save("repeats")
+    assert len(repeats.to_dict()["clouds"]) == 2 and "after-2.toml" not in files("repeats")
+
+
+def test_several_clouds_are_checked(drifting, tmp_path):
+    def said(*words):
+        done = command(tmp_path, "diagnose", *words, "-o", "by-command")
+        assert done.returncode == 1
+        return done.stderr.splitlines()[-1].removeprefix("error: ")
+
+    with pytest.raises(md.UsageError) as number:
+        md.diagnose(["a.ply", "b.ply", "out/cloud.ply"], ["a.toml", "b.toml"])
+    flags = ["--scene", "a.toml", "--scene", "b.toml"]
+    assert str(number.value) == said("a.ply", "b.ply", "out/cloud.ply", *flags).replace("--scene", "scene")
+    with pytest.raises(md.UsageError) as twice:
+        md.diagnose(["a.ply", "a.ply"], "a.toml")
+    assert str(twice.value) == said("a.ply", "a.ply", "--scene", "a.toml")
+    cloud = md.Cloud.load("a.ply")
+    with pytest.raises(md.UsageError, match="points-2 is given twice"):
+        md.diagnose([cloud, md.Cloud.load("a.ply")], "a.toml")
+    with pytest.raises(md.UsageError, match="there is no cloud"):
+        md.diagnose([], "a.toml")
+    with pytest.raises(TypeError, match="give a matdb.Cloud"):
+        md.diagnose([cloud, 7], "a.toml")
+    law, other = [md.Material("mine", lambda theta_deg, at=at: 0 * theta_deg - at) for at in (10, 20)]
+    scenes = [md.load_scene(f"{name}.toml").with_materials({"all": one}) for name, one in [("a", law), ("b", other)]]
+    with pytest.raises(md.UsageError, match="one material in a scene and another one in the next"):
+        md.diagnose(["a.ply", "b.ply"], scenes)
+
+
+def kept(name):
+    """What a database has, without when it was stored."""
+    db = md.open(name)
+    revisions = {(one, line["revision"]): line for one in db.names() for line in db.history(one)}
+    timeless = {key: {word: value for word, value in line.items() if "created" not in word} for key, line in revisions.items()}
+    return timeless, {key: db[f"{key[0]}@{key[1]}"].content_hash for key in revisions}
+
+
+def test_what_is_found_is_stored_as_by_the_command_line(drifting, tmp_path):
+    db = md.open("by-hand.sqlite")
+    why = md.diagnose("a.ply", "a.toml", db=db, add=True, **drifting)
+    assert not list(Path().glob("*-after.toml"))
+    said_by_command(tmp_path, "diagnose", "a.ply", "--scene", "a.toml", "-o", "by-command", "--add",
+                    *QUICK)
+    assert why.stored == ["mannequin-paint@2"] and kept("by-hand.sqlite") == kept("matdb.sqlite")
+    [after] = why.scenes_after
+    assert after.text == Path("a-after.toml").read_text() and 'name = "drift"' in after.text
+    why.save("why")
+    of_words = ["report.html"]  # it names the folder and the database
+    by_hand, by_command = files("why"), files("by-command")
+    assert by_hand.keys() == by_command.keys()
+    assert all(by_hand[name] == by_command[name] for name in by_hand if name not in of_words)
+    assert b"after.toml -o rendered" in by_hand["report.html"] and b"a-after.toml" not in by_hand["report.html"]
+    back = pickle.loads(pickle.dumps(why))
+    assert back.stored == why.stored and [scene.text for scene in back.scenes_after] == [after.text]
+    # Nothing is missing any more, and that is stored, too: the same diagnosis twice is one revision.
+    for _ in range(2):
+        again = md.diagnose("a.ply", after, db=db, add=True, **drifting)
+        assert again.stored == ["mannequin-paint@3"] and again.scenes_after == [] and again.effects == []
+    # Without `add`, nothing is.
+    alone = md.diagnose("a.ply", "a.toml", db=db, **drifting)
+    assert alone.stored == [] == alone.scenes_after and db["mannequin-paint"].revision == 3
+
+
+def test_scenes_of_arrays_have_what_was_found(drifting):
+    db = md.open()
+    meshes = {"plate": {"mesh": plate_of(1.0), "translation_m": [0, 1.1, 0], "rotation_deg": [0, 8, 0]}}
+    radar = md.load_scene("a.toml").to_dict()["radar"]
+    scene = md.Scene(meshes=meshes, materials="mannequin-paint", radar=radar)
+    scan = md.render(scene.replace(radar__effect=[{"name": "drift", "slope_db": 8.0}]), seed=5)
+    why = md.diagnose(scan, scene, db=db, add=True, **drifting)
+    [after] = why.scenes_after
+    assert [effect["name"] for effect in after.to_dict()["radar"]["effect"]] == ["drift"]
+    assert md.render(after, db=db).record["counts"] and why.stored == ["mannequin-paint@2"]
+
+
+def test_nothing_is_stored_where_something_is_refused(drifting):
+    db = md.open("mine.sqlite")
+    with pytest.raises(md.UsageError, match="give db"):
+        md.diagnose("a.ply", "a.toml", add=True, **drifting)
+    with pytest.raises(md.UsageError, match="the scene has no material `cotton`"):
+        md.diagnose("a.ply", "a.toml", db=db, add=True, material="cotton", **drifting)
+    given = md.load_scene("a.toml").with_materials({"all": md.Material("mine", lambda theta_deg: 0 * theta_deg - 10)})
+    with pytest.raises(md.UsageError, match="`given:mine` .*; add it to the database"):
+        md.diagnose("a.ply", given, db=db, add=True, **drifting)
+    few = md.Cloud.load("a.ply")
+    few = md.Cloud(few.xyz_m[:40], few.power_dbm[:40])
+    with pytest.raises(md.DiagnoseError):
+        md.diagnose(few, "a.toml", db=db, add=True, **drifting)
+    assert len(db) == 0
+
+
+def levels(scatter_db, bump_db=0.0):
+    """A curve of 80 levels about a lobe and a flat part, with a bump that no law has."""
+    angles = np.arange(0, 80.0)
+    level = 10 * np.log10(10 * np.exp(-((angles / 4) ** 2)) + 0.03 * np.cos(np.radians(angles)) ** 2)
+    level += bump_db * np.exp(-(((angles - 40) / 6) ** 2)) + np.random.default_rng(3).normal(0, scatter_db, 80)
+    return "theta_deg,sigma0_db\n" + "".join(f"{angle},{one}\n" for angle, one in zip(angles, level))
+
+
+def test_a_curve_is_diagnosed_as_by_the_command_line(scene, tmp_path):
+    Path("curve.csv").write_text(levels(0.3, bump_db=3.0))
+    why = md.diagnose_curve("curve.csv", model="mixture", noise_db=0.3, seed=2)
+    words = ["diagnose", "--curve", "curve.csv", "--model", "mixture", "--noise-db", "0.3", "--seed", "2", "-o", "by-command"]
+    assert why.to_dict() == said_by_command(tmp_path, *words)
+    why.save("why")
+    assert files("why") == files("by-command")
+    why.report("page.html")
+    assert Path("page.html").read_bytes() == files("why")["report.html"]
+    # Their names of columns, and some effects.
+    Path("theirs.csv").write_text(levels(0.3).replace("theta_deg", "inc"))
+    few = md.diagnose_curve("theirs.csv", columns={"inc": "theta_deg"}, effects=["stray-light", "stray-light"], noise_db=0.3)
+    flags = ["--columns", "inc=theta_deg", "--effects", "stray-light", "--noise-db", "0.3", "-o", "few"]
+    assert few.to_dict() == said_by_command(tmp_path, "diagnose", "--curve", "theirs.csv", *flags)
+    # A material's curve is that of its export, and a measurement the file that it saves.
+    db = md.open()
+    db.add(files=["curve.csv"], name="mine", material_class="paint", kind="measured", source="A test", licence="CC0-1.0",
+           instrument="Ours", frequency_ghz=300, threshold_dbm=-77)
+    db.export("mine", "mine.csv", format="csv", curve="curve")
+    said = said_by_command(tmp_path, "diagnose", "--curve", "mine.csv", "--noise-db", "0.3", "-o", "of-material")
+    for given in ["mine", db["mine"]]:
+        own = md.diagnose_curve(given, db=db, noise_db=0.3)
+        # The export has 15 digits.
+        assert own.verdict == said["verdict"] and own.before["rmse_db"] == pytest.approx(said["error"]["before"]["rmse_db"], 1e-6)
+    wide = scene.replace(radar__scan__width_m=1.0, radar__scan__height_m=1.0)
+    measured = md.measure(md.render(wide), wide)
+    measured.save("measured")
+    said = said_by_command(tmp_path, "diagnose", "--curve", "measured/curve.csv", "-o", "of-measurement")
+    own = md.diagnose_curve(measured)
+    assert own.to_dict() == said and pickle.loads(pickle.dumps(own)).verdict == own.verdict
+
+
+def test_a_curve_that_cannot_be_diagnosed_is_refused(scene, tmp_path):
+    Path("curve.csv").write_text(levels(0.3))
+    with pytest.raises(md.UsageError, match="a curve has no model `mixtur`; did you mean `mixture`"):
+        md.diagnose_curve("curve.csv", model="mixtur")
+    with pytest.raises(md.UsageError, match="a curve has no effect `drift`"):
+        md.diagnose_curve("curve.csv", effects=["drift"])
+    with pytest.raises(md.FileError, match="nothing.csv"):
+        md.diagnose_curve("nothing.csv")
+    with pytest.raises(md.UnknownMaterialError):
+        md.diagnose_curve("nothing")
+    with pytest.raises(TypeError):
+        md.diagnose_curve(7)
+    Path("short.csv").write_text("".join(levels(0.3).splitlines(keepends=True)[:12]))
+    with pytest.raises(md.DiagnoseError) as short:
+        md.diagnose_curve("short.csv")
+    said = command(tmp_path, "diagnose", "--curve", "short.csv", "-o", "short")
+    assert said.returncode == 1 and said.stderr.splitlines()[-1] == f"error: {short.value}"
+    with pytest.raises(md.Error, match="read"):
+        Path("residuals.csv").write_text(levels(0.3))
+        md.diagnose_curve("residuals.csv", noise_db=0.3, effects=["stray-light"]).save(".")
+
+
+def test_a_radar_is_shown_as_by_the_command_line(scene, tmp_path):
+    said = said_by_command(tmp_path, "radar", "plate.toml", "-o", "by-command")
+    del said["output"]
+    for number, given in enumerate(["plate.toml", Path("plate.toml"), scene]):
+        shown = md.radar(given)
+        shown.save(f"by-hand-{number}")
+        assert shown.to_dict() == said and files(f"by-hand-{number}") == files("by-command")
+    assert shown._repr_png_() == files("by-command")["scan.png"] and repr(shown) == "<matdb.Radar upm-300ghz: 144 chirps>"
+    assert pickle.loads(pickle.dumps(shown)).to_dict() == said
+    assert md.radar("upm-300ghz").to_dict()["chirps"] > 144
+    with pytest.raises(md.SceneError) as unknown:
+        md.radar("upm")
+    assert command(tmp_path, "radar", "upm", "-o", "none").stderr == f"error: {unknown.value}\n"
+    with pytest.raises(TypeError, match="give a matdb.Scene"):
+        md.radar(7)
+
+
+def test_files_to_begin_with_are_those_of_the_command_line(scene, tmp_path):
+    md.render(scene).save("out")
+    words = ["new", "scene", "--cloud", "out/cloud.ply", "--mesh", "builtin:plate", "--radar-at", "0,1.1,8", "--look-at", "0,1.1,0",
+             "--frequency", "280"]
+    assert command(tmp_path, *words, "-o", "by-command/scene.toml").returncode == 0
+    made = md.new_scene("out/cloud.ply", "builtin:plate", "by-hand/scene.toml", radar_at_m=(0, 1.1, 8), look_at_m=(0, 1.1, 0),
+                        frequency_ghz=280)
+    assert files("by-hand") == files("by-command")
+    assert made.text == Path("by-hand/scene.toml").read_text() and md.measure("out/cloud.ply", made).record
+    points = md.Cloud(md.Cloud.load("out/cloud.ply").xyz_m, md.Cloud.load("out/cloud.ply").power_dbm)
+    with pytest.raises(md.UsageError) as nowhere:
+        md.new_scene(points, "builtin:plate", "points/scene.toml")
+    assert nowhere.value.hint == "say where the radar stood, as in radar_at_m=(0, 1.2, 3)"
+    with pytest.raises(md.UsageError, match="radar_at_m = .* is not a place"):
+        md.new_scene(points, "builtin:plate", "points/scene.toml", radar_at_m=(0, 1, np.nan))
+    assert not Path("points").exists()
+    assert md.new_scene(points, "builtin:plate", "points/scene.toml", radar_at_m=[0, 1.1, 8]).chirps == len(points)
+    with pytest.raises(md.UsageError, match="exists already; name another"):
+        md.new_scene(points, "builtin:plate", "by-hand/scene.toml", radar_at_m=[0, 1.1, 8])
+    assert files("by-hand") == files("by-command")
+    assert command(tmp_path, "new", "material", "my-paint", "-o", "paint-by-command").returncode == 0
+    assert md.new_material("my-paint") == Path("my-paint")
+    assert files("my-paint") == files("paint-by-command")
+    with pytest.raises(md.UsageError, match="exists already"):
+        Path("my-paint/scan.csv").write_text("mine")
+        md.new_material("my-paint")
+    with pytest.raises(md.UsageError):
+        md.new_material("My Paint")
+    with pytest.warns(UserWarning):
+        assert md.open().add(files=[md.new_material("my-other", "elsewhere")]) == ["my-other@1"]

@@ -75,7 +75,23 @@ impl CurveRequest<'_> {
     /// [`Error::CurveFile`] for bytes that are not a curve, [`Error::CurveDiagnosis`] for a curve of which nothing
     /// can be said.
     pub fn diagnose(&self, bytes: &[u8]) -> Result<(CurveReport, Vec<String>), Error> {
-        let (points, notices) = self.points(bytes)?;
+        let (curve, sd_db, mut notices) = self.read(bytes).map_err(|error| self.of_file(error))?;
+        let (report, of_points) = self.diagnose_curve(&curve, &sd_db)?;
+        notices.extend(of_points);
+        Ok((report, notices))
+    }
+
+    /// As [`CurveRequest::diagnose`], of a curve that is read; `sd_db` is what is stated of the deviation of each level, for
+    /// none or for all rows.
+    ///
+    /// # Errors
+    /// As [`CurveRequest::diagnose`].
+    pub fn diagnose_curve(
+        &self,
+        curve: &Curve,
+        sd_db: &[Option<f64>],
+    ) -> Result<(CurveReport, Vec<String>), Error> {
+        let (points, notices) = self.points(curve, sd_db).map_err(|error| self.of_file(error))?;
         let law = self.law.cloned().unwrap_or_else(base_law);
         let diagnosis = CurveDiagnosis { seed: self.seed, ..CurveDiagnosis::default() };
         match diagnosis.run(&points, &law, self.effects) {
@@ -86,11 +102,12 @@ impl CurveRequest<'_> {
         }
     }
 
-    fn points(&self, bytes: &[u8]) -> Result<(Points, Vec<String>), Error> {
-        self.read(bytes).map_err(|error| Error::CurveFile { file: self.path.to_owned(), error })
+    fn of_file(&self, error: FormatError) -> Error {
+        Error::CurveFile { file: self.path.to_owned(), error }
     }
 
-    fn read(&self, bytes: &[u8]) -> Result<(Points, Vec<String>), FormatError> {
+    /// The curve of a file, what is stated of the deviation of its levels, and what a person should know.
+    fn read(&self, bytes: &[u8]) -> Result<(Curve, Vec<Option<f64>>, Vec<String>), FormatError> {
         let is_named_so = self.path.extension().is_some_and(|end| end.eq_ignore_ascii_case("bsdf"));
         if is_named_so && !is_bsdf(bytes) {
             // What it lacks.
@@ -104,20 +121,27 @@ impl CurveRequest<'_> {
         if stated.contains(&true) && stated.contains(&false) {
             notices.push("`sd_db` is not used: some levels have none".to_owned());
         }
+        Ok((curve, sd_db, notices))
+    }
+
+    /// The points of a curve, and what a person should know of them.
+    fn points(
+        &self,
+        curve: &Curve,
+        sd_db: &[Option<f64>],
+    ) -> Result<(Points, Vec<String>), FormatError> {
         if curve.illumination.relative {
             let problem = "the levels are relative, and a law has levels of its own";
             let way_out =
                 "calibrate them, or `matdb fit` the curve: its widths and exponents need no level";
             return Err(FormatError::at("column relative", problem, way_out));
         }
-        let points = Points::of_curve(&curve, &sd_db, self.noise_db).map_err(|row| {
+        let points = Points::of_curve(curve, sd_db, self.noise_db).map_err(|row| {
             let place = format!("point {row} (from 1)");
             FormatError::at(place, "it is out of the plane of incidence", "leave such points out")
         })?;
         let grazing = curve.observations.iter().filter(|row| is_grazing(row)).count();
-        if grazing > 0 {
-            notices.push(format!("levels at 89.9° or more are not used: {grazing}"));
-        }
-        Ok((points, notices))
+        let notice = format!("levels at 89.9° or more are not used: {grazing}");
+        Ok((points, if grazing > 0 { vec![notice] } else { Vec::new() }))
     }
 }
