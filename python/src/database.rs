@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use matdb::adopt::{
     CatalogueImport, CheckReport, CurveOrigin, DatabaseCheck, FitStorage, FitSubject,
-    FittedMaterial, NewMaterials, Withdrawal, publish, remove_materials, verify,
+    FittedMaterial, NewMaterials, Withdrawal, publish, remove_materials,
 };
 use matdb::catalogue::exchange::{Details, Export, Format};
 use matdb::catalogue::{About, Citable, Credit, Diff, Rank, references};
@@ -192,7 +192,7 @@ fn curve_of(
 /// dict
 #[pyfunction]
 pub(crate) fn verify<'py>(py: Python<'py>, bundle: PathBuf) -> PyResult<Bound<'py, PyAny>> {
-    let verified = py.detach(|| verify(&bundle));
+    let verified = py.detach(|| matdb::adopt::verify(&bundle));
     to_python(py, &verified.map_err(raised)?)
 }
 

@@ -147,7 +147,12 @@ pub(crate) fn diagnose(
             return Err(UsageError::new_err(format!("{problem}; give one another name")));
         }
     }
-    let declared = scenes.iter().map(|scene| scene.own_effects(py)).collect::<PyResult<Vec<_>>>()?;
+    let declared =
+        scenes.iter().map(|scene| scene.own_effects(py)).collect::<PyResult<Vec<_>>>()?;
+    if add && declared.iter().any(|effects| !effects.is_empty()) {
+        let problem = "what is found beside effects of one's own cannot be stored; diagnose without add, or without them";
+        return Err(UsageError::new_err(problem));
+    }
     let request = CloudRequest {
         cloud: first,
         scene: first_scene,

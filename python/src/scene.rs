@@ -93,7 +93,7 @@ impl Scene {
         path: PathBuf,
     ) -> Result<Scene, matdb::error::Error> {
         let scene = self.scene.replace(parse(&text, &path)?, &path, &self.given)?;
-        Ok(Scene { text, path, scene, given: self.given.clone() })
+        Ok(Scene { text, path, scene, given: self.given.clone(), effects: Vec::new() })
     }
 
     fn table(&self) -> PyResult<Table> {
