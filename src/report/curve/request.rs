@@ -31,6 +31,9 @@ pub struct CurveRequest<'a> {
     pub seed: u64,
 }
 
+/// A curve, and what is stated of the deviation of each of its levels, dB.
+type Levels = (Curve, Vec<Option<f64>>);
+
 /// The law of this name, to compare a curve with.
 ///
 /// # Errors
@@ -75,7 +78,8 @@ impl CurveRequest<'_> {
     /// [`Error::CurveFile`] for bytes that are not a curve, [`Error::CurveDiagnosis`] for a curve of which nothing
     /// can be said.
     pub fn diagnose(&self, bytes: &[u8]) -> Result<(CurveReport, Vec<String>), Error> {
-        let (curve, sd_db, mut notices) = self.read(bytes).map_err(|error| self.of_file(error))?;
+        let ((curve, sd_db), mut notices) =
+            self.read(bytes).map_err(|error| self.of_file(error))?;
         let (report, of_points) = self.diagnose_curve(&curve, &sd_db)?;
         notices.extend(of_points);
         Ok((report, notices))
@@ -106,8 +110,8 @@ impl CurveRequest<'_> {
         Error::CurveFile { file: self.path.to_owned(), error }
     }
 
-    /// The curve of a file, what is stated of the deviation of its levels, and what a person should know.
-    fn read(&self, bytes: &[u8]) -> Result<(Curve, Vec<Option<f64>>, Vec<String>), FormatError> {
+    /// The levels of a file, and what a person should know of it.
+    fn read(&self, bytes: &[u8]) -> Result<(Levels, Vec<String>), FormatError> {
         let is_named_so = self.path.extension().is_some_and(|end| end.eq_ignore_ascii_case("bsdf"));
         if is_named_so && !is_bsdf(bytes) {
             // What it lacks.
@@ -121,7 +125,7 @@ impl CurveRequest<'_> {
         if stated.contains(&true) && stated.contains(&false) {
             notices.push("`sd_db` is not used: some levels have none".to_owned());
         }
-        Ok((curve, sd_db, notices))
+        Ok(((curve, sd_db), notices))
     }
 
     /// The points of a curve, and what a person should know of them.
