@@ -274,7 +274,7 @@ fn the_page_in_three_dimensions_says_what_it_leaves_out_and_has_the_same_bytes_o
 }
 
 #[test]
-fn the_page_of_the_built_in_materials_is_small_and_has_a_point_of_each() {
+fn the_page_of_the_built_in_materials_is_small_and_shows_each() {
     let mut store = Store::in_memory().unwrap();
     let all: Vec<Material> =
         builtin::names().map(|name| builtin::get(name).unwrap().unwrap()).collect();
@@ -284,9 +284,9 @@ fn the_page_of_the_built_in_materials_is_small_and_has_a_point_of_each() {
     const MOST_BYTES: usize = 1_000_000;
     assert!(drawn.page.len() < MOST_BYTES, "{} bytes", drawn.page.len());
     assert_eq!(drawn.places.len(), all.len());
-    for (slug, place) in &drawn.places {
-        assert!(place.contains("&point="), "{slug} has no point: {place}");
-    }
+    // Where each is shown depends on its number alone, so that the pages that lead there are the same on every machine.
+    let places: BTreeSet<&String> = drawn.places.values().collect();
+    assert_eq!(places.len(), all.len());
 }
 
 #[test]

@@ -131,15 +131,13 @@ fn a_catalogue_leads_from_a_material_to_its_ball() {
     browser.wait("return !!window.matdbView");
     browser.script("window.matdbView.ready.then(() => { window.isReady = true })");
     browser.wait("return window.isReady === true");
-    // The point that is chosen is one of cotton, in the middle of the scene.
-    browser.wait("return document.querySelector('#values').innerText.includes('cotton')");
-    let point = browser.script("return window.matdbView.state().point");
-    let [x, y] = [("0", "Width"), ("1", "Height")].map(|(at, side)| {
-        let pixel = format!("window.matdbView.pixelOf({point})[{at}]");
-        let share = format!("return {pixel} / document.querySelector('#cloud').client{side}");
-        browser.script(&share).as_f64().unwrap()
-    });
-    assert!((0.25..0.75).contains(&x) && (0.25..0.75).contains(&y), "{x} {y}");
+    // The camera looks at the ball whose name is cotton's.
+    let camera = browser.script("return window.matdbView.state().camera");
+    let label = browser.script(
+        "return JSON.parse(document.getElementById('view').textContent).balls.labels.find((one) => one[0] === 'cotton')[1]",
+    );
+    let off = |at: usize| camera[3 + at].as_f64().unwrap() - label[at].as_f64().unwrap();
+    assert!(off(0).abs() < 1e-3 && (0.0..0.1).contains(&off(1)), "{camera} {label}");
     was_quiet(&browser);
     browser.click("nav a[href='index.html']");
     browser.wait("return document.querySelectorAll('#results h2').length === 3");

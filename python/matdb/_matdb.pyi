@@ -513,7 +513,6 @@ class Effect:
         parameters: Mapping[str, tuple[float, ...]],
         *,
         level: str = "scene",
-        description: str | None = None,
         starts: Sequence[Mapping[str, float]] | None = None,
         uses_time: bool = False,
     ) -> Effect: ...
@@ -525,7 +524,6 @@ class Effect:
         gain_db: Callable[..., ArrayLike],
         parameters: dict[str, Any],
         level: str,
-        description: str,
         starts: list[dict[str, float]],
         uses_time: bool,
     ) -> Effect: ...

@@ -68,11 +68,15 @@ pub(crate) fn diagnose_curve(
     columns: Option<&Bound<'_, PyDict>>,
     seed: u64,
 ) -> PyResult<Diagnosis> {
+    let has_columns = columns.is_some();
     let columns = columns.map_or(Ok(ColumnNames::default()), column_names)?;
     let diagnosed = py.detach(|| {
         let law = model.map(curve_law).transpose()?;
         let effects = curve_terms(&effects)?;
         let (name, levels) = levels_of(&what, curve, db)?;
+        if has_columns && matches!(what, What::Measured(_) | What::Material(_)) {
+            return Err(ignored("columns", "a file"));
+        }
         let path = Path::new(&name);
         let (columns, law) = (&columns, law.as_ref());
         let request = CurveRequest { path, columns, law, noise_db, effects: &effects, seed };
@@ -100,6 +104,12 @@ pub(crate) fn diagnose_curve(
     Ok(diagnosis)
 }
 
+/// The refusal of a keyword that would do nothing.
+pub(crate) fn ignored(keyword: &str, of: &str) -> Error {
+    let problem = format!("{keyword} is for {of}");
+    Error::Usage { problem, way_out: "leave it out".to_owned() }
+}
+
 /// Where the levels of a curve come from.
 enum Levels {
     /// The bytes of its file.
@@ -118,11 +128,15 @@ fn levels_of(
         What::Named(name) => {
             let path = Path::new(name);
             if name.ends_with(".csv") || name.ends_with(".bsdf") || path.is_file() {
+                if curve.is_some() {
+                    return Err(ignored("curve", "a material"));
+                }
                 return Ok((name.clone(), Levels::File(read_small(path)?)));
             }
             let store = db.map_or(Ok(None), Database::read)?;
             FitSubject::of_material(name, curve, find_material(store.as_ref(), name, "")?)?
         }
+        What::Measured(_) if curve.is_some() => return Err(ignored("curve", "a material")),
         What::Measured(measured) => {
             let (subject, _) = measured.get().subject();
             // What it saves is rounded.

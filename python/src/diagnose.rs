@@ -100,6 +100,8 @@ where
 /// ------
 /// matdb.DiagnoseError
 ///     Too few data, or data that are not of this scene.
+/// matdb.StoreError
+///     With `add`, what could not be stored. The error's `diagnosis` is the answer all the same.
 ///
 /// Warns
 /// -----
@@ -178,11 +180,28 @@ pub(crate) fn diagnose(
         Ok((checked, report))
     })?;
     let (checked, report) = answer.map_err(raised::<Error>)?;
-    let (answer, scenes_after, notices) =
-        py.detach(|| publish(&checked, &report, scenes, db)).map_err(raised)?;
-    warn(py, &notices)?;
+    let published = py.detach(|| publish(&checked, &report, scenes, db)).map_err(raised)?;
+    let Published { answer, scenes_after, notices, refusal } = published;
     let scenes_after = scenes_after.into_iter().map(|scene| Py::new(py, scene));
-    Ok(Diagnosis { scenes_after: scenes_after.collect::<PyResult<_>>()?, ..answer })
+    let answer = Diagnosis { scenes_after: scenes_after.collect::<PyResult<_>>()?, ..answer };
+    let Err(refusal) = refusal.map_or_else(|| warn(py, &notices), |error| Err(raised(error)))
+    else {
+        return Ok(answer);
+    };
+    // The work is done, and is not lost with what could not be stored, or with a warning that raises.
+    refusal.value(py).setattr("diagnosis", Py::new(py, answer)?)?;
+    Err(refusal)
+}
+
+/// A diagnosis with what became of it.
+struct Published {
+    answer: Diagnosis,
+    /// Its scenes with what was found, where that was stored.
+    scenes_after: Vec<Scene>,
+    /// What a person should not overlook.
+    notices: Vec<String>,
+    /// Why nothing was stored though it was asked for.
+    refusal: Option<Error>,
 }
 
 /// The files of clouds, or names in their place, each another one.
@@ -247,46 +266,42 @@ fn inputs(clouds: &[CloudLike], names: &[PathBuf], scenes: &[&Scene]) -> Result<
     Ok(known.into_iter().map(|(_, input)| input).collect())
 }
 
-/// The answer, its scenes with what was found, and what a person should not overlook. Stores what was found, if that was asked
-/// for.
+/// The answer. What was found is stored, if that was asked for.
 fn publish(
     checked: &CheckedRequest,
     report: &Report,
     scenes: &[&Scene],
     db: Option<&Database>,
-) -> Result<(Diagnosis, Vec<Scene>, Vec<String>), Error> {
+) -> Result<Published, Error> {
     let notices = checked.notices();
     let database = db.map(Database::database);
     let program = database.as_ref().map_or_else(|| "matdb".to_owned(), program);
     let command = format!("{program} diagnose");
-    let publication = Publication::new(checked, report, &notices, [program, command]);
+    let words = [program, command];
+    let publication = Publication::new(checked, report, &notices, words.clone());
     let contradiction = publication.report().contradiction();
     let (record, page) = (json!(publication.report().record()), publication.page_alone()?);
-    let (published, scenes_after, publication) = match database {
-        Some(database) if checked.request.add && contradiction.is_none() => {
-            let (publication, mut store) = (publication.with_scenes_in_folder(), database.write()?);
-            let places = publication.cloud_of_each_scene();
-            let (published, scenes_after) = publication.store(&mut store, |_, beside| {
-                let mut after = Vec::new();
-                for ((folder, files), place) in beside.iter().zip(places) {
-                    for (name, text) in files {
-                        let text = String::from_utf8_lossy(text).into_owned();
-                        after.push(scenes[place].with_file(text, folder.join(name))?);
-                    }
-                }
-                Ok(after)
-            })?;
-            (published, scenes_after, publication)
+    let wanted = database.filter(|_| checked.request.add && contradiction.is_none());
+    let mut said = Vec::from_iter(contradiction);
+    let stored = wanted.map(|database| {
+        let of_files = Publication::new(checked, report, &notices, words).with_scenes_in_folder();
+        let stored = store_found(&of_files, &database, scenes)?;
+        Ok((stored, of_files.notices()))
+    });
+    let (published, scenes_after, refusal) = match stored {
+        Some(Ok(((published, scenes_after), of_storing))) => {
+            said.extend(of_storing);
+            (published, scenes_after, None)
         }
-        _ => {
+        not_stored => {
+            if checked.request.add {
+                said.extend(publication.notices());
+            }
             let files = publication.files()?;
-            (PublicationResult { files, ..PublicationResult::default() }, Vec::new(), publication)
+            let published = PublicationResult { files, ..PublicationResult::default() };
+            (published, Vec::new(), not_stored.and_then(Result::err))
         }
     };
-    let mut notices = Vec::from_iter(contradiction);
-    if checked.request.add {
-        notices.extend(publication.notices());
-    }
     let whole = |path: PathBuf| absolute(&path).unwrap_or(path);
     let answer = Diagnosis {
         record,
@@ -297,7 +312,26 @@ fn publish(
         stored: published.stored,
         scenes_after: Vec::new(),
     };
-    Ok((answer, scenes_after, notices))
+    Ok(Published { answer, scenes_after, notices: said, refusal })
+}
+
+/// Stores what was found, and makes of each scene the one with it.
+fn store_found(
+    publication: &Publication,
+    database: &matdb::setup::Database,
+    scenes: &[&Scene],
+) -> Result<(PublicationResult, Vec<Scene>), Error> {
+    let places = publication.cloud_of_each_scene();
+    publication.store(&mut database.write()?, |_, beside| {
+        let mut after = Vec::new();
+        for ((folder, files), place) in beside.iter().zip(places) {
+            for (name, text) in files {
+                let text = String::from_utf8_lossy(text).into_owned();
+                after.push(scenes[place].with_file(text, folder.join(name))?);
+            }
+        }
+        Ok(after)
+    })
 }
 
 /// The physical effects that `diagnose` looks for: what each is, how it shows, and its numbers, as `matdb effects --json` prints

@@ -1,7 +1,5 @@
 //! A physical effect of a program's own: a gain as a function of the chirps.
 
-use std::panic::resume_unwind;
-
 use matdb::effects::{self, About, EffectParameter, Level, Shot, Stage, find};
 use matdb::units::ratio_from_db;
 use numpy::PyArray1;
@@ -10,6 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
 use crate::error::{UsageError, no_choice};
+use crate::own::{self, dict_of};
 
 /// Largest gain or loss, dB.
 const MOST_DB: f64 = 300.0;
@@ -18,22 +17,22 @@ const STEP: f64 = 1.0 / 120.0;
 
 /// A physical effect of one's own, for exploration: a gain in dB as a function of the chirps.
 ///
-/// `diagnose` tries it beside those of the library, and `Scene.with_effects` renders it. The function is called for some hundred
-/// chirps at once, from several threads in turn, thousands of times in a diagnosis: that is slow, and no file can declare such
-/// an effect. It stays in memory as long as the interpreter.
+/// `diagnose` tries it beside those of the library, and `Scene.with_effects` renders it. The function is called from several
+/// threads in turn, and gets some hundred chirps at once from `diagnose`, thousands of times, and one ray from `render` and
+/// `compare`: that is slow. The gain of a chirp must not depend on the others. No file can declare such an effect, and it stays
+/// in memory as long as the interpreter. It cannot itself render, fit or diagnose.
 ///
 /// Parameters
 /// ----------
 /// name : str
 ///     Short name that no effect of the library has.
 /// gain_db : callable
-///     Takes the chirps, a `Shots`, and the values of the parameters by name. Gives the gain of each chirp, dB, or one for all.
+///     Takes the chirps, a `Shots`, and the values of the parameters by name. Gives the gain of each chirp, dB, or one for all;
+///     -inf where no echo returns, and at most 300.
 /// parameters : dict of str to tuple
 ///     The range of each parameter, `(low, high)`, in which 0 means that the effect is absent; or `(low, high, absent)`.
 /// level : str, default "scene"
 ///     What has the effect: `instrument`, `material` or `scene`.
-/// description : str, optional
-///     What it is, for a person.
 /// starts : list of dict, optional
 ///     Values that a search starts from, parameters that are not named being absent. Two steps of each parameter to both sides
 ///     unless stated; an effect with a place needs several.
@@ -146,14 +145,13 @@ impl Effect {
 #[pymethods]
 impl Effect {
     #[new]
-    #[pyo3(signature = (name, gain_db, parameters, *, level = "scene", description = None, starts = None, uses_time = false))]
+    #[pyo3(signature = (name, gain_db, parameters, *, level = "scene", starts = None, uses_time = false))]
     fn new(
         name: &str,
         gain_db: Bound<'_, PyAny>,
-        parameters: &Bound<'_, PyDict>,
+        parameters: &Bound<'_, PyAny>,
         level: &str,
-        description: Option<&str>,
-        starts: Option<Vec<Bound<'_, PyDict>>>,
+        starts: Option<Vec<Bound<'_, PyAny>>>,
         uses_time: bool,
     ) -> PyResult<Effect> {
         let level = match level {
@@ -173,23 +171,25 @@ impl Effect {
                 "gain_db is a function of the chirps and of the parameters",
             ));
         }
+        let parameters = dict_of(parameters)?;
         if parameters.is_empty() {
             return Err(UsageError::new_err("an effect has at least one parameter"));
         }
         let mut known = Vec::new();
-        for (name, range) in parameters {
+        for (name, range) in &parameters {
             known.push(parameter(name.extract()?, &range)?);
         }
         let starts = match starts {
-            Some(starts) => {
-                starts.iter().map(|start| values(&known, start)).collect::<PyResult<_>>()?
-            }
+            Some(starts) => starts
+                .iter()
+                .map(|start| values(&known, &dict_of(start)?))
+                .collect::<PyResult<_>>()?,
             None => usual_starts(&known),
         };
         let about = About {
             name: kept(name),
             level,
-            description: kept(description.unwrap_or("An effect of a program's own.")),
+            description: "An effect of a program's own.",
             signature: "What a function of a program says.",
             parameters: known.leak(),
             conflicts: &[],
@@ -225,15 +225,7 @@ impl Effect {
             }
             named.push(values);
         }
-        let given = (
-            about.name,
-            gain_db,
-            ranges,
-            about.level.as_str(),
-            about.description,
-            named,
-            uses_time,
-        );
+        let given = (about.name, gain_db, ranges, about.level.as_str(), named, uses_time);
         (slf.get_type().getattr("_of_parts")?, given).into_pyobject(py)
     }
 
@@ -242,56 +234,34 @@ impl Effect {
     fn _of_parts(
         name: &str,
         gain_db: Bound<'_, PyAny>,
-        parameters: &Bound<'_, PyDict>,
+        parameters: &Bound<'_, PyAny>,
         level: &str,
-        description: &str,
-        starts: Vec<Bound<'_, PyDict>>,
+        starts: Vec<Bound<'_, PyAny>>,
         uses_time: bool,
     ) -> PyResult<Effect> {
-        Effect::new(name, gain_db, parameters, level, Some(description), Some(starts), uses_time)
+        Effect::new(name, gain_db, parameters, level, Some(starts), uses_time)
     }
 }
 
 impl Own {
     /// The gains of some chirps, as ratios.
     fn gains(&self, values: &[f64], shots: Vec<Shot>) -> Vec<f64> {
-        let count = shots.len();
-        let gains = Python::attach(|py| self.asked(py, values, shots));
-        match gains {
-            Ok(gains) if gains.len() == count => gains,
-            Ok(gains) => {
-                let problem = format!(
-                    "effect `{}` gives {} gains for {count} chirps; give one for each, or one for all",
-                    self.about.name,
-                    gains.len()
-                );
-                resume_unwind(Box::new(UsageError::new_err(problem)))
+        let gains_db = own::called(|py| {
+            let (count, named) = (shots.len(), PyDict::new(py));
+            for (known, value) in self.about.parameters.iter().zip(values) {
+                named.set_item(known.name, value)?;
             }
-            // An effect cannot refuse: the error ends the work as Ctrl-C does.
-            Err(raised) => resume_unwind(Box::new(raised)),
-        }
-    }
-
-    fn asked(&self, py: Python<'_>, values: &[f64], shots: Vec<Shot>) -> PyResult<Vec<f64>> {
-        let (count, named) = (shots.len(), PyDict::new(py));
-        for (known, value) in self.about.parameters.iter().zip(values) {
-            named.set_item(known.name, value)?;
-        }
-        let shots = Bound::new(py, Shots { shots })?;
-        let gains_db = self.gain_db.bind(py).call((shots,), Some(&named))?;
-        let numpy = py.import("numpy")?;
-        let gains_db = numpy.call_method1("asarray", (gains_db, "float64"))?;
-        let one_for_all: bool = gains_db.getattr("ndim")?.eq(0)?;
-        let gains_db: Vec<f64> = if one_for_all {
-            vec![gains_db.extract()?; count]
-        } else {
-            gains_db.call_method0("tolist")?.extract()?
-        };
-        if gains_db.iter().any(|gain_db| gain_db.is_nan()) {
-            let problem = format!("effect `{}` gives NaN; give gains in dB", self.about.name);
-            return Err(UsageError::new_err(problem));
-        }
-        Ok(gains_db.into_iter().map(|db| ratio_from_db(db.clamp(-MOST_DB, MOST_DB))).collect())
+            let gains_db = own::levels_db(self.gain_db.bind(py), Shots { shots }, &named, count)?;
+            if gains_db.iter().any(|gain_db| gain_db.is_nan() || *gain_db > MOST_DB) {
+                let name = self.about.name;
+                let problem = format!(
+                    "effect `{name}` gives NaN, or more than {MOST_DB} dB, with {named}; give gains in dB, and -inf for no echo"
+                );
+                return Err(UsageError::new_err(problem));
+            }
+            Ok(gains_db)
+        });
+        gains_db.into_iter().map(|db| ratio_from_db(db.max(-MOST_DB))).collect()
     }
 }
 

@@ -17,12 +17,14 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::cloud::column_names;
+use crate::curve::ignored;
 use crate::database::Database;
 use crate::error::{no_choice, raised};
 use crate::interrupt::interruptible;
 use crate::json::{of_text, text_of, to_python};
 use crate::material::{Material, sigma0_db};
 use crate::measure::{Instrument, Measurement};
+use crate::own::or_unwind;
 use crate::words::in_python;
 
 /// A model that was fitted to a curve.
@@ -169,22 +171,30 @@ pub(crate) fn fit(
         let held = fixed.iter().map(|(path, value)| Ok((path.extract()?, value.extract()?)));
         held.collect::<PyResult<Vec<(String, f64)>>>()
     })?;
+    let (given_curve, given_columns) = (curve.is_some(), columns.is_some());
     let columns = columns.map_or(Ok(ColumnNames::default()), column_names)?;
-    let own = match &model {
-        Some(ModelLike::Function(material)) => {
-            Some((material.get().name().to_owned(), material.get().law(py)?))
-        }
+    let useless = match &what {
+        What::Named(_) => None,
+        What::Measured(_) if given_curve => Some("curve"),
+        What::Measured(_) | What::Material(_) => given_columns.then_some("columns"),
+    };
+    if let Some(keyword) = useless {
+        return Err(raised(ignored(keyword, "the name of a material or of a file")));
+    }
+    let own_model = match &model {
+        Some(ModelLike::Function(material)) => Some(material.get()),
         Some(ModelLike::Named(_)) | None => None,
     };
     let model = model.as_ref().and_then(ModelLike::name);
     let database = db.map_or_else(|| setup::Database::new(None), Database::database);
-    let fitted = interruptible(py, |_| {
+    let fitted = interruptible(py, |stop| {
+        let own = own_model.map(|own| (own.name(), or_unwind(own.law(stop.clone()))));
         // Without a database, one that happens to lie in the working directory is not read.
         let store = db.map(|_| database.read()).transpose()?.flatten();
         let usual = FitRequest::new("");
         let request = FitRequest {
             model,
-            own: own.as_ref().map(|(name, law)| (name.as_str(), law)),
+            own: own.as_ref().map(|(name, law)| (*name, law)),
             method,
             curve,
             columns,
@@ -233,7 +243,11 @@ pub(crate) fn fit(
         let fitted = Fit { fit, subject, measured, own: values, record, notices };
         refusal.map_or(Ok(fitted), Err)
     })?;
-    fitted.map_err(raised::<Error>)
+    let fitted = fitted.map_err(raised::<Error>)?;
+    if let (Some(own), Some(values)) = (own_model, &fitted.own) {
+        own.warn_at(py, values)?;
+    }
+    Ok(fitted)
 }
 
 impl ModelLike {

@@ -1,6 +1,7 @@
 //! Long work without the interpreter's lock, which Ctrl-C ends.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
@@ -8,11 +9,14 @@ use std::time::Duration;
 
 use pyo3::prelude::*;
 
+use crate::own::refuse_inside;
+
 /// How long a signal may wait.
 const PATIENCE: Duration = Duration::from_millis(50);
 
 /// Set when the work is to end.
-pub(crate) struct Stop(AtomicBool);
+#[derive(Clone)]
+pub(crate) struct Stop(Arc<AtomicBool>);
 
 /// What unwinds the threads of work that was stopped.
 struct Stopped;
@@ -33,7 +37,8 @@ pub(crate) fn interruptible<T: Send>(
     py: Python<'_>,
     work: impl FnOnce(&Stop) -> T + Send,
 ) -> PyResult<T> {
-    let stop = Stop(AtomicBool::new(false));
+    refuse_inside()?;
+    let stop = Stop(Arc::new(AtomicBool::new(false)));
     let mut signal = None;
     let done = py.detach(|| {
         thread::scope(|scope| {
@@ -59,14 +64,16 @@ pub(crate) fn interruptible<T: Send>(
         })
     });
     match (done, signal) {
-        (Err(payload), Some(raised)) if payload.is::<Stopped>() => Err(raised),
+        (Ok(done), None) => Ok(done),
+        // One that came too late to stop the work must not be lost.
+        (Ok(_), Some(raised)) => Err(raised),
+        (Err(payload), Some(raised)) if payload.is::<Stopped>() || payload.is::<PyErr>() => {
+            Err(raised)
+        }
         // A function of the program that failed inside the work.
         (Err(payload), _) => match payload.downcast::<PyErr>() {
             Ok(raised) => Err(*raised),
             Err(payload) => resume_unwind(payload),
         },
-        // The signal came too late to stop the work, and must not be lost.
-        (Ok(_), Some(raised)) => Err(raised),
-        (Ok(done), None) => Ok(done),
     }
 }

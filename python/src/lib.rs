@@ -18,6 +18,7 @@ mod interrupt;
 mod json;
 mod material;
 mod measure;
+mod own;
 mod pose;
 mod scan;
 mod scene;

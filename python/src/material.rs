@@ -1,6 +1,5 @@
 //! A material.
 
-use std::panic::resume_unwind;
 use std::path::PathBuf;
 
 use matdb::brdf::{Brdf, Scattering};
@@ -15,7 +14,9 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
 use crate::error::{UsageError, no_choice, raised, warn};
+use crate::interrupt::Stop;
 use crate::json::{of_text, text_of, to_python};
+use crate::own::{self, dict_of};
 
 /// A material in one revision; or one of a function, for exploration.
 ///
@@ -118,16 +119,28 @@ impl Material {
         })
     }
 
+    /// Warns where the curve of its function at these values of its parameters is off the function.
+    pub(crate) fn warn_at(&self, py: Python<'_>, values: &[(String, f64)]) -> PyResult<()> {
+        let (function, mut own) = self.own_function()?.clone_ref(py);
+        for (parameter, (_, value)) in own.iter_mut().zip(values) {
+            parameter.start = *value;
+        }
+        Material::sampled(py, self.name(), function.bind(py), own).map(|_| ())
+    }
+
     /// The law of its function, of which `fit` finds the parameters. Where the function fails, the work that calls it unwinds
     /// with the error.
-    pub(crate) fn law(&self, py: Python<'_>) -> PyResult<OwnLaw> {
-        let (function, own) = self.own_function()?.clone_ref(py);
+    pub(crate) fn law(&self, stop: Stop) -> PyResult<OwnLaw> {
+        let (function, own) =
+            Python::attach(|py| Ok::<_, PyErr>(self.own_function()?.clone_ref(py)))?;
         let law = OwnLaw::new(own.clone(), move |values, angles_deg| {
-            let levels_db = Python::attach(|py| {
+            stop.check();
+            own::called(|py| {
                 let named = named(py, &own, values)?;
-                levels_db(function.bind(py), &named, angles_deg)
-            });
-            levels_db.unwrap_or_else(|raised| resume_unwind(Box::new(raised)))
+                let levels_db = levels_db(function.bind(py), &named, angles_deg)?;
+                check_levels(&named, angles_deg, &levels_db)?;
+                Ok(levels_db)
+            })
         });
         law.map_err(|error| UsageError::new_err(error.to_string()))
     }
@@ -164,11 +177,6 @@ fn parameter(name: String, given: &Bound<'_, PyAny>) -> PyResult<OwnParameter> {
         .extract::<(f64, f64, f64)>()
         .map_err(|_| PyTypeError::new_err(format!("parameters[{name:?}] is (start, low, high)")));
     let (start, min, max) = numbers?;
-    if name == "looks" {
-        let problem =
-            "`looks` are those of the speckle, which a fit finds by itself; take another name";
-        return Err(UsageError::new_err(problem));
-    }
     Ok(OwnParameter { name, min, max, start })
 }
 
@@ -192,18 +200,30 @@ pub(crate) fn law_file(material: &matdb::material::Material) -> PyResult<Vec<u8>
     Ok(text.into_bytes())
 }
 
-/// The levels that a function gives at some angles. One number stands for all.
+/// The levels that a function gives at some angles, dB.
 fn levels_db(
     function: &Bound<'_, PyAny>,
     named: &Bound<'_, PyDict>,
     angles_deg: &[f64],
 ) -> PyResult<Vec<f64>> {
-    let py = function.py();
-    let numpy = py.import("numpy")?;
-    let levels_db = function.call((PyArray1::from_slice(py, angles_deg),), Some(named))?;
-    let levels_db = numpy.call_method1("asarray", (levels_db, "float64"))?;
-    let levels_db = numpy.call_method1("broadcast_to", (levels_db, angles_deg.len()))?;
-    levels_db.call_method0("tolist")?.extract()
+    let of = PyArray1::from_slice(function.py(), angles_deg);
+    own::levels_db(function, of, named, angles_deg.len())
+}
+
+/// Refuses levels that are no law: no numbers, or levels after there were none.
+fn check_levels(named: &Bound<'_, PyDict>, angles_deg: &[f64], levels_db: &[f64]) -> PyResult<()> {
+    let mut is_silent = false;
+    for (angle_deg, &level_db) in angles_deg.iter().zip(levels_db) {
+        let is_none = level_db == f64::NEG_INFINITY;
+        if level_db.is_nan() || level_db == f64::INFINITY || (is_silent && !is_none) {
+            return Err(UsageError::new_err(format!(
+                "the function gives {level_db} dB at {angle_deg:.4}° with {named}; narrow the ranges of the parameters, or give \
+                 finite levels, and -inf from the angle on from which nothing comes back"
+            )));
+        }
+        is_silent |= is_none;
+    }
+    Ok(())
 }
 
 #[pymethods]
@@ -214,9 +234,10 @@ impl Material {
         py: Python<'_>,
         name: &str,
         sigma0_db: &Bound<'_, PyAny>,
-        parameters: Option<&Bound<'_, PyDict>>,
+        parameters: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Material> {
-        Material::sampled(py, name, sigma0_db, own_parameters(parameters)?)
+        let parameters = parameters.map(dict_of).transpose()?;
+        Material::sampled(py, name, sigma0_db, own_parameters(parameters.as_ref())?)
     }
 
     /// The material of the same function with other values of its parameters, such as those of a fit.

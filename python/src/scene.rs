@@ -16,9 +16,10 @@ use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyString, PyTuple};
 use toml::{Table, Value};
 
 use crate::effect::Effect;
-use crate::error::{UsageError, no_choice, raised};
+use crate::error::{UsageError, no_choice, raised, warn};
 use crate::json::{of_text, text_of, to_python};
 use crate::material::{Material, law_file};
+use crate::own::dict_of;
 
 /// Radar, scan and target. It never changes; `replace` makes another.
 ///
@@ -293,23 +294,24 @@ impl Scene {
         self.with_text(py, table.to_string(), own)
     }
 
-    /// This scene with effects of one's own, beside those of its file. `render`, `compare` and `diagnose` apply them; no file of
+    /// This scene with effects of one's own, beside those that it has. `render`, `compare` and `diagnose` apply them; no file of
     /// the scene says them.
     ///
     /// Parameters
     /// ----------
     /// effects : dict of Effect to dict of str to float
-    ///     The values of the parameters of each; those that are not named are absent.
-    fn with_effects(&self, py: Python<'_>, effects: &Bound<'_, PyDict>) -> PyResult<Scene> {
-        let mut own: Vec<(Py<Effect>, Py<PyDict>)> = Vec::new();
-        for (effect, values) in effects {
+    ///     The values of the parameters of each; those that are not named are absent. An effect that the scene has gets others.
+    fn with_effects(&self, py: Python<'_>, effects: &Bound<'_, PyAny>) -> PyResult<Scene> {
+        let mut own = self.effects_again(py);
+        for (effect, values) in &dict_of(effects)? {
             let effect = effect.cast::<Effect>().map_err(|_| {
                 PyTypeError::new_err(
                     "with_effects takes {effect: {parameter: value}} of matdb.Effect",
                 )
             })?;
-            let values = values.cast::<PyDict>()?.copy()?;
+            let values = dict_of(&values)?;
             effect.get().with_values(&values)?;
+            own.retain(|(other, _)| !other.is(effect));
             if own.iter().any(|(other, _)| other.get().name() == effect.get().name()) {
                 let problem = format!("two effects are called {}", effect.get().name());
                 return Err(UsageError::new_err(format!("{problem}; give one another name")));
@@ -324,12 +326,26 @@ impl Scene {
 
     fn __repr__(&self) -> String {
         let facets = self.scene.target.mesh.facets.len();
-        format!("<matdb.Scene {}: {} chirps, {facets} facets>", self.name(), self.chirps())
+        let own: String = self
+            .effects
+            .iter()
+            .map(|(effect, _)| format!(", with {}", effect.get().name()))
+            .collect();
+        format!("<matdb.Scene {}: {} chirps, {facets} facets{own}>", self.name(), self.chirps())
     }
 
     /// Writes its file, with the meshes that are in no file beside it as PLY, and the laws of the materials that it was
     /// given as `material-NAME.toml`, which `Database.add` takes.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        for (effect, _) in &self.effects {
+            let name = effect.get().name();
+            warn(
+                py,
+                &[format!(
+                    "the file does not say effect `{name}`, which is a function of the program"
+                )],
+            )?;
+        }
         let (mut table, mut files) = (self.table()?, Vec::new());
         for (number, entry) in entries(&mut table, "mesh").enumerate() {
             let mesh = given(entry, "file").and_then(|name| self.given.get(name));

@@ -1,11 +1,13 @@
 """The bindings: the bytes of the command line, arrays that fit them, errors, interruption, threads and memory."""
 
+import contextlib
 import html
 import json
 import pickle
 import re
 import resource
 import signal
+import sqlite3
 import subprocess
 import sys
 import threading
@@ -283,7 +285,7 @@ def examples():
     root = Path(__file__).parent.parent.parent
     pages = [(root / page).read_text() for page in ["python/README.md", "docs/python.md"]]
     found = [example for page in pages for example in re.findall(r"```python\n(.*?)```", page, re.DOTALL)]
-    assert len(found) == 8
+    assert len(found) >= 10
     return found
 
 
@@ -975,7 +977,8 @@ def test_an_effect_of_a_function_is_rendered_and_found(tmp_path):
     assert "no file can declare: sideways" in (tmp_path / "report.html").read_text()
 
 
-def test_an_effect_of_a_function_is_checked():
+def test_an_effect_of_a_function_is_checked(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     bench = md.load_scene("builtin:bench")
     for name, function, parameters, options, said in [
         ("drift", sideways, {"slope_db": (-1, 1)}, {}, "the library has an effect `drift`"),
@@ -1000,7 +1003,9 @@ def test_an_effect_of_a_function_is_checked():
     for function, kind, said in [
         (lambda shots, slope_db: 1 / 0, ZeroDivisionError, "division"),
         (lambda shots, slope_db: np.nan, md.UsageError, "effect `own` gives NaN"),
-        (lambda shots, slope_db: np.zeros(len(shots) + 1), md.UsageError, "gives .* gains for .* chirps"),
+        (lambda shots, slope_db: np.inf, md.UsageError, "or more than 300 dB"),
+        (lambda shots, slope_db: np.zeros(len(shots) + 1), ValueError, "broadcast"),
+        (lambda shots, slope_db: md.render(bench) and 0, md.UsageError, "cannot render, fit or diagnose itself"),
         (lambda shots: 0.0, TypeError, "slope_db"),
     ]:
         with pytest.raises(kind, match=said):
@@ -1009,6 +1014,13 @@ def test_an_effect_of_a_function_is_checked():
             md.diagnose(md.render(bench), bench, own_effects=[of(function)], effects=["drift"], controls=False)
     with pytest.raises(md.UsageError, match="two effects are called own"):
         bench.with_effects({of(sideways): {}, of(sideways): {}})
+    both = bench.with_effects({of(sideways): {}}).with_effects(types.MappingProxyType(
+        {md.Effect("other", sideways, {"slope_db": (-20, 20)}): {}}))
+    assert repr(both).endswith("facets, with own, with other>")
+    with pytest.warns(UserWarning, match="the file does not say effect `other`"):
+        both.save("both/scene.toml")
+    with pytest.raises(md.UsageError, match="beside effects of one's own cannot be stored"):
+        md.diagnose(md.render(bench), both, db=md.open("own.sqlite"), add=True)
     with pytest.raises(md.UsageError, match="slope_db = 30.* out of range"):
         bench.with_effects({of(sideways): {"slope_db": 30}})
 
@@ -1049,6 +1061,14 @@ def test_the_parameters_of_a_function_are_fitted(scene, tmp_path):
         best.at(alpha=0)
     with pytest.raises(md.UsageError, match="no parameter `beta`.* there are: r_s, alpha"):
         curve.fit(own, fixed={"beta": 1})
+    with pytest.raises(md.UsageError, match="cannot be called `looks`"):
+        md.Material("own", lambda theta_deg, looks: -looks, parameters={"looks": (1, 0, 2)})
+    with pytest.raises(md.UsageError, match="gives nan dB at 0.0000° with {'m': "):
+        curve.fit(md.Material("own", lambda theta_deg, m: -m if m == 1 else np.nan, parameters={"m": (1, 0, 2)}))
+    with pytest.raises(md.UsageError, match="columns is for the name of a material or of a file; leave it out"):
+        md.fit(curve, columns={"a": "theta_deg"})
+    with pytest.raises(md.UsageError, match="curve is for a material; leave it out"):
+        md.diagnose_curve(curve, curve="wet")
     with pytest.raises(md.UsageError, match="m = 2 is out of range; give a value from 0 to 1"):
         md.Material("own", lambda theta_deg, m: -m, parameters={"m": (2, 0, 1)})
     with pytest.raises(TypeError, match="is .start, low, high."):
@@ -1224,13 +1244,26 @@ def test_nothing_is_stored_where_something_is_refused(drifting):
     with pytest.raises(md.UsageError, match="the scene has no material `cotton`"):
         md.diagnose("a.ply", "a.toml", db=db, add=True, material="cotton", **drifting)
     given = md.load_scene("a.toml").with_materials({"all": md.Material("mine", lambda theta_deg: 0 * theta_deg - 10)})
-    with pytest.raises(md.UsageError, match="`given:mine` .*; add it to the database"):
+    with pytest.raises(md.UsageError, match="`given:mine` .*; add it to the database, if"):
         md.diagnose("a.ply", given, db=db, add=True, **drifting)
     few = md.Cloud.load("a.ply")
     few = md.Cloud(few.xyz_m[:40], few.power_dbm[:40])
     with pytest.raises(md.DiagnoseError):
         md.diagnose(few, "a.toml", db=db, add=True, **drifting)
     assert len(db) == 0
+
+
+def test_an_answer_outlives_a_database_that_cannot_be_written(drifting):
+    db = md.open("mine.sqlite")
+    db.add("mannequin-paint")
+    with contextlib.closing(sqlite3.connect("mine.sqlite")) as other:
+        other.execute("BEGIN IMMEDIATE")
+        with pytest.raises(md.StoreError, match="locked|another program") as refused:
+            md.diagnose("a.ply", "a.toml", db=db, add=True, **drifting)
+    why = refused.value.diagnosis
+    assert [effect["name"] for effect in why.effects] == ["drift"] and why.stored == [] == why.scenes_after
+    why.save("why")
+    assert 'name = "drift"' in Path("why/after.toml").read_text() and db["mannequin-paint"].revision == 1
 
 
 def levels(scatter_db, bump_db=0.0):

@@ -63,9 +63,10 @@ pub fn check_recipients(ready: &ReadyScene) -> Result<(), Error> {
         if ready.scene.given.contains_key(name) {
             return Err(Error::Usage {
                 problem: format!(
-                    "`{name}` is a material that the scene was given, and in no database"
+                    "`{name}` is a material that the scene keeps itself, not one of the database"
                 ),
-                way_out: "add it to the database, and name it in the scene".to_owned(),
+                way_out: "add it to the database, if it is not there, and give the scene its name"
+                    .to_owned(),
             });
         }
         if material.curves.iter().any(|curve| curve.name == FIT) {

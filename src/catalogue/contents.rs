@@ -20,10 +20,11 @@ pub(super) fn rebuilt(
     store: &Store,
     about: &About,
     published: &Path,
-    database: Checksum,
+    [database, view]: [Checksum; 2],
     draw: DrawView,
 ) -> Result<BTreeMap<String, Checksum>, CatalogueError> {
-    let mut folder = Folder::hashed(published, BTreeMap::from([(DATABASE.to_owned(), database)]))?;
+    let taken = [(DATABASE.to_owned(), database), (VIEW.to_owned(), view)];
+    let mut folder = Folder::hashed(published, BTreeMap::from(taken))?;
     write_contents(&mut folder, store, about, draw, |_| ())?;
     Ok(folder.sums().clone())
 }
@@ -41,7 +42,10 @@ pub(super) fn write_contents(
     // A licence that nobody declared is not recorded as declared: the next publication derives its own.
     let about = &About { licence: licence_of_all(store, about)?, ..about.clone() };
     let view = draw(store, about)?;
-    folder.write(VIEW, &view.page)?;
+    // Powers of many rays, the last digits of which are those of a machine: a page that is there is taken by its checksum.
+    if !folder.sums().contains_key(VIEW) {
+        folder.write(VIEW, &view.page)?;
+    }
     let (mut entries, mut site) = (Vec::new(), Site::new(about)?);
     for (number, summary) in store.list()?.iter().enumerate() {
         let Some(stored) = store.get(&summary.slug, None)? else {

@@ -75,7 +75,7 @@ pub struct ImportSummary {
 }
 
 impl Import {
-    /// Opens a published folder or its database after a complete check, for which `draw` makes `view.html` again.
+    /// Opens a published folder or its database after a complete check; `draw` as for [`verify_with`].
     ///
     /// # Errors
     /// When it is not a catalogue, anything in it is wrong, or a newer program made it.

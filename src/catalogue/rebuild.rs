@@ -8,7 +8,7 @@ use super::about::About;
 use super::api::Index;
 use super::contents::rebuilt;
 use super::folder::Checksum;
-use super::layout::{ABOUT, DATABASE, INDEX};
+use super::layout::{ABOUT, DATABASE, INDEX, VIEW};
 use super::problem::{Problem, problem};
 use super::read::read;
 use super::tables::HAS_PARQUET;
@@ -28,11 +28,12 @@ pub(super) fn check_rebuilt(
     if !scope.same_schema {
         return notes;
     }
-    let made = database_sum(bundle, sums).and_then(|database| {
+    let made = || {
+        let taken = [taken(bundle, sums, DATABASE)?, taken(bundle, sums, VIEW)?];
         let about = read::<About>(bundle, ABOUT).map_err(|what| problem(ABOUT, what))?;
-        rebuilt(store, &about, bundle, database, draw).map_err(|error| problem(DATABASE, error))
-    });
-    let made = match made {
+        rebuilt(store, &about, bundle, taken, draw).map_err(|error| problem(DATABASE, error))
+    };
+    let made = match made() {
         Ok(made) => made,
         Err(what) => {
             problems.push(what);
@@ -58,10 +59,10 @@ pub(super) fn check_rebuilt(
     notes
 }
 
-/// The hash and the size of the database.
-fn database_sum(bundle: &Path, sums: &BTreeMap<String, String>) -> Result<Checksum, Problem> {
-    let found = fs::metadata(bundle.join(DATABASE)).map_err(|reason| problem(DATABASE, reason))?;
-    let sha256 = sums.get(DATABASE).cloned().unwrap_or_default();
+/// The hash and the size of a file that is not made again.
+fn taken(bundle: &Path, sums: &BTreeMap<String, String>, file: &str) -> Result<Checksum, Problem> {
+    let found = fs::metadata(bundle.join(file)).map_err(|reason| problem(file, reason))?;
+    let sha256 = sums.get(file).cloned().unwrap_or_default();
     Ok(Checksum { sha256, bytes: found.len() })
 }
 

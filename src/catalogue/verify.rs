@@ -37,8 +37,8 @@ pub struct Verification {
     pub problems: Vec<Problem>,
 }
 
-/// Checks a published folder, or a database by itself. `draw` makes `view.html` again, which is compared with the one
-/// there. [`adopt::verify`](crate::adopt::verify) has this program's page.
+/// Checks a published folder, or a database by itself. `draw` says where `view.html`, which counts by its checksum, shows a
+/// material. [`adopt::verify`](crate::adopt::verify) has this program's page.
 ///
 /// # Errors
 /// When `bundle` is neither. Whatever is wrong inside is in [`Verification::problems`].

@@ -415,6 +415,11 @@ impl Coordinates {
         Table::new(&self.model(at), self.beam_rad, aspects)
     }
 
+    /// Whether they are of a law of a program's own, whose names mean nothing here.
+    pub fn is_own(&self) -> bool {
+        matches!(self.base, Base::Own(..))
+    }
+
     /// The chosen k, where backscatter does not determine it; `None` for a model without such a gauge.
     pub fn gauge(&self) -> Option<f64> {
         self.gauge

@@ -55,7 +55,7 @@ pub use error::FitError;
 pub(crate) use goodness::normal_share;
 pub use minimise::Stop;
 pub use models::{model, model_names};
-pub use own_law::{OwnFunction, OwnLaw, OwnParameter};
+pub use own_law::{OwnFunction, OwnLaw, OwnLawError, OwnParameter};
 pub use result::{Band, FitResult};
 pub use settings::{Fit, Method};
 pub use stored::{stored_band, undetermined};

@@ -3,6 +3,9 @@
 use std::fmt;
 use std::sync::Arc;
 
+use thiserror::Error;
+
+use super::coordinates::LOOKS;
 use crate::brdf::{Brdf, Lambert, ParameterError};
 use crate::material::sampled_law;
 
@@ -43,6 +46,20 @@ pub struct OwnLaw {
     sigma0_db: Arc<OwnFunction>,
 }
 
+/// Why parameters are none of a law.
+#[derive(Debug, Error, PartialEq)]
+pub enum OwnLawError {
+    /// A start or a range.
+    #[error(transparent)]
+    Range(#[from] ParameterError),
+    /// Two of a name, or that of the looks of the speckle, which a fit finds by itself.
+    #[error("a parameter cannot be called `{name}`, which is taken; take another name")]
+    Name {
+        /// The name.
+        name: String,
+    },
+}
+
 /// Level of a law of nothing, dB.
 const NOTHING_DB: f64 = -300.0;
 
@@ -50,16 +67,19 @@ impl OwnLaw {
     /// A law of its parameters and its function, which must give a level for every angle.
     ///
     /// # Errors
-    /// A start outside its range; a range that is empty or not finite.
+    /// A start outside its range; a range that is empty or not finite; a name that is taken.
     pub fn new(
         parameters: Vec<OwnParameter>,
         sigma0_db: impl Fn(&[f64], &[f64]) -> Vec<f64> + Send + Sync + 'static,
-    ) -> Result<OwnLaw, ParameterError> {
-        for OwnParameter { name, min, max, start } in &parameters {
+    ) -> Result<OwnLaw, OwnLawError> {
+        for (number, OwnParameter { name, min, max, start }) in parameters.iter().enumerate() {
+            if *name == LOOKS || parameters[..number].iter().any(|other| other.name == *name) {
+                return Err(OwnLawError::Name { name: name.clone() });
+            }
             let is_range = min.is_finite() && max.is_finite() && min < max;
             if !(is_range && (min..=max).contains(&start)) {
                 let (path, value) = (name.clone(), *start);
-                return Err(ParameterError { path, value, min: *min, max: *max });
+                return Err(ParameterError { path, value, min: *min, max: *max }.into());
             }
         }
         Ok(OwnLaw { parameters, sigma0_db: Arc::new(sigma0_db) })
@@ -150,6 +170,27 @@ mod tests {
         assert!(matches!(held("alpha", 1000.0), Err(FitError::Parameter(_))));
         let outside = OwnLaw::new(vec![number("m", [0.0, 1.0], 2.0)], |_, _| Vec::new());
         assert!(outside.unwrap_err().to_string().contains("m = 2"));
+        for names in [["looks", "m"], ["m", "m"]] {
+            let parameters = names.map(|name| number(name, [0.0, 1.0], 0.5));
+            let taken = OwnLaw::new(parameters.into(), |_, _| Vec::new()).unwrap_err();
+            assert!(taken.to_string().contains("which is taken"), "{taken}");
+        }
+    }
+
+    #[test]
+    fn relative_levels_above_any_model_are_no_matter_to_a_law_of_its_own() {
+        let parameters = vec![number("R", [1e-6, 1e9], 1.0)];
+        let flat = OwnLaw::new(parameters, |values, theta_deg| {
+            theta_deg.iter().map(|_| 10.0 * values[0].log10()).collect()
+        });
+        let mut curve = curve();
+        curve.illumination.relative = true;
+        for row in &mut curve.observations {
+            row.sigma0 = row.sigma0.map(|sigma0| 1e6 * sigma0);
+            row.threshold_sigma0 = row.threshold_sigma0.map(|limit| 1e6 * limit);
+        }
+        let found = Fit { starts: 1, ..Fit::default() }.run_own(&flat.unwrap(), &curve);
+        assert!(found.unwrap().estimate("R").unwrap().value > 1.0);
     }
 
     #[test]

@@ -91,6 +91,9 @@ fn stopped_level(result: &FitResult, found: &SearchResult) -> Option<(String, bo
     const LEVELS: [&str; 5] = [SPECULAR_LEVEL, DIFFUSE_LEVEL, "albedo", "r_s", "f_lambda"];
     /// The way there and back through the scale of the search rounds.
     const NEARLY_1: f64 = 1.0 - 1e-9;
+    if result.coordinates.is_own() {
+        return None;
+    }
     let gradient = found.best.local.gradient.iter();
     let levels = result.estimates.iter().zip(&result.coordinates.list).zip(gradient);
     let levels = levels.filter(|((estimate, _), _)| {

@@ -252,8 +252,6 @@ fn half_ball(centre: DVec3, radar: DVec3) -> Mesh {
 struct Rendered {
     points: Points,
     image: Option<PlaneImage>,
-    /// For every ball its strongest point.
-    strongest: Vec<Option<usize>>,
     notices: Vec<String>,
 }
 
@@ -274,12 +272,7 @@ impl Rendered {
         let validity = ready.validity(&setup, &footprints);
         let validity = validity.iter().filter(|warning| warning.way_out.is_none());
         notices.extend(validity.map(ToString::to_string));
-        Ok(Rendered {
-            points: points(&echoes, names),
-            image: Some(image),
-            strongest: strongest(&echoes, names.len()),
-            notices,
-        })
+        Ok(Rendered { points: points(&echoes, names), image: Some(image), notices })
     }
 }
 
@@ -319,35 +312,19 @@ fn points(echoes: &[&Echo], names: &[&str]) -> Points {
     }
 }
 
-/// For every region the echo with the most power, the first of several.
-fn strongest(echoes: &[&Echo], regions: usize) -> Vec<Option<usize>> {
-    let mut strongest: Vec<Option<usize>> = vec![None; regions];
-    for (number, echo) in echoes.iter().enumerate() {
-        let Some(best) = region_of(echo).and_then(|region| strongest.get_mut(region)) else {
-            continue;
-        };
-        if best.is_none_or(|best| echo.power_w > echoes[best].power_w) {
-            *best = Some(number);
-        }
-    }
-    strongest
-}
-
 /// A place to a tenth of a millimetre.
 fn rounded(place: DVec3) -> [f64; 3] {
     // Without the sign of a zero.
     place.to_array().map(|at| (1e4 * at).round() / 1e4 + 0.0)
 }
 
-/// What stands behind `#` in the address for a view of one ball from the side, with a point chosen.
-fn address(centre: DVec3, point: Option<usize>) -> String {
+/// What stands behind `#` in the address for a view of one ball from the side.
+fn address(centre: DVec3) -> String {
     /// Angles of the camera about the ball and of its field of view, rad, and its distance, m.
     const YAW_PITCH_DISTANCE: &str = "0.5,0.3,0.45";
     const FIELD_OF_VIEW: &str = "0.6";
     let [x, y, z] = rounded(centre);
-    let camera = format!("camera=[{YAW_PITCH_DISTANCE},{x},{y},{z},{FIELD_OF_VIEW}]");
-    let point = point.map_or(String::new(), |point| format!("&point={point}"));
-    camera + &point
+    format!("camera=[{YAW_PITCH_DISTANCE},{x},{y},{z},{FIELD_OF_VIEW}]")
 }
 
 /// Renders the balls and makes the page.
@@ -355,7 +332,7 @@ fn draw(chosen: &Chosen, about: &About) -> Result<CatalogueView, Error> {
     let Chosen { materials, left_out, .. } = chosen;
     let grid = Grid::new(materials.len());
     let names: Vec<&str> = materials.iter().map(|one| one.slug.as_str()).collect();
-    let Rendered { points, image, strongest, notices } = if names.is_empty() {
+    let Rendered { points, image, notices } = if names.is_empty() {
         Rendered::default()
     } else {
         Rendered::new(grid.scene(materials)?, &names)?
@@ -379,9 +356,8 @@ fn draw(chosen: &Chosen, about: &About) -> Result<CatalogueView, Error> {
             notices: obstacles.chain(notices).collect(),
         }),
     };
-    let places = std::iter::zip(materials, &grid.centres).zip(strongest);
-    let places =
-        places.map(|((material, centre), point)| (material.slug.clone(), address(*centre, point)));
+    let places = std::iter::zip(materials, &grid.centres);
+    let places = places.map(|(material, centre)| (material.slug.clone(), address(*centre)));
     Ok(CatalogueView { page: page.bytes()?, places: places.collect() })
 }
 
