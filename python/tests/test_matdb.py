@@ -283,9 +283,9 @@ def test_memory_does_not_grow(scene):
 
 def examples():
     root = Path(__file__).parent.parent.parent
-    pages = [(root / page).read_text() for page in ["python/README.md", "docs/python.md"]]
+    pages = [(root / page).read_text() for page in ["README.md", "python/README.md", "docs/python.md"]]
     found = [example for page in pages for example in re.findall(r"```python\n(.*?)```", page, re.DOTALL)]
-    assert len(found) >= 10
+    assert len(found) >= 11
     return found
 
 
@@ -475,27 +475,16 @@ def test_comparing_and_calibrating_are_those_of_the_command_line(tmp_path, monke
 
 
 # The lines of a first afternoon, in an empty folder.
-AFTERNOON = """
-db    = md.open("matdb.sqlite")
-scene = md.load_scene("builtin:concealed")
-scan  = md.render(scene, db=db, seed=7)
-img   = scan.power_dbm
-cloud = scan.cloud
-scan
-scan.save("out/")
-
-points = md.Cloud(scan.xyz_m, scan.points_dbm)
-curve  = md.measure(points, scene, region="skin")
-fit    = curve.fit("cook-torrance + blinn-phong")
-db.add("my-skin", fit, source="My bench, 2026", licence="CC-BY-4.0")
-why    = md.diagnose(points, scene)
-"""
-
-
 def test_a_first_afternoon(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    said = {"md": md}
-    exec(AFTERNOON, said)
+    notebook = Path(__file__).parent.parent.parent / "examples" / "notebooks" / "first_afternoon.ipynb"
+    cells = json.loads(notebook.read_text())["cells"]
+    import matplotlib.pyplot as plt
+
+    plt.switch_backend("Agg")
+    said = {}
+    exec("\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"), said)
+    plt.close("all")
     assert list(said["db"]) == ["my-skin"] and said["why"].verdict == "no-missing-effect"
 
 

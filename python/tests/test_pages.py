@@ -4,6 +4,7 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 import sysconfig
 from pathlib import Path
 
@@ -223,3 +224,8 @@ def test_the_lines_of_a_page_run(page, tmp_path, monkeypatch):
         # What needs other programs, such as another version, is left out.
         elif language == "sh" and not commands(language, text) and re.match(r"(matdb|sed|mkdir|tar|python3 examples/lab)\b", text):
             shell(text)
+
+
+def test_the_page_of_all_names_is_that_of_the_package():
+    made = subprocess.run([sys.executable, Path(__file__).parent / "api_page.py"], capture_output=True, text=True, check=True)
+    assert made.stdout == (ROOT / "docs" / "python-api.md").read_text(), "python python/tests/api_page.py > docs/python-api.md"
