@@ -180,13 +180,19 @@ try:
 except KeyboardInterrupt:
     print("interrupted", flush=True)
 """
-    running = subprocess.Popen([sys.executable, "-c", program], cwd=tmp_path, stdout=subprocess.PIPE, text=True)
-    assert running.stdout.readline() == "begun\n"
-    time.sleep(0.5)
-    assert running.poll() is None, "the render is too short for this test"
-    running.send_signal(signal.SIGINT)
-    said, _ = running.communicate(timeout=20)
-    assert said == "interrupted\n" and running.returncode == 0
+    took_s = []
+    # The machine may be busy with other things: the best of three counts.
+    while len(took_s) < 3 and min(took_s, default=9) > 1:
+        running = subprocess.Popen([sys.executable, "-c", program], cwd=tmp_path, stdout=subprocess.PIPE, text=True)
+        assert running.stdout.readline() == "begun\n"
+        time.sleep(0.5)
+        assert running.poll() is None, "the render is too short for this test"
+        sent_s = time.monotonic()
+        running.send_signal(signal.SIGINT)
+        assert running.stdout.readline() == "interrupted\n"
+        took_s.append(time.monotonic() - sent_s)
+        assert running.wait(timeout=20) == 0
+    assert min(took_s) < 1, took_s
 
 
 def test_an_interruption_ends_the_command(scene, tmp_path):
@@ -276,9 +282,9 @@ def test_memory_does_not_grow(scene):
     for _ in range(50):
         md.render(scene)
     before = kilobytes()
-    for _ in range(200):
+    for _ in range(1000):
         md.render(scene)
-    assert kilobytes() - before < 8_000, "200 renders of 40 kB of files each"
+    assert kilobytes() - before < 8_000, "1000 renders of 40 kB of files each"
 
 
 def examples():
