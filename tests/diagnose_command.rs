@@ -705,6 +705,7 @@ fn two_clouds_of_one_target_have_one_answer() {
     fs::write(folder.path().join("stronger.toml"), stronger).unwrap();
     let matdb = || matdb(folder.path());
     matdb().args(["render", "-q", "stronger.toml", "-o", "out2"]).assert().success();
+    fs::copy(folder.path().join("out/cloud.ply"), folder.path().join("copy.ply")).unwrap();
     let both = [
         "diagnose",
         "out/cloud.ply",
@@ -751,6 +752,7 @@ fn two_clouds_of_one_target_have_one_answer() {
         (&["out2/cloud.ply", "--scene", "scene.toml", "--scene", "other.toml"][..], "is of `ptfe`"),
         (&["out/cloud.ply", "--scene", "scene.toml"][..], "is given twice"),
         (&["./out/cloud.ply", "--scene", "scene.toml"][..], "is given twice"),
+        (&["copy.ply", "--scene", "scene.toml"][..], "cloud.ply and copy.ply have the same powers"),
     ] {
         let message =
             refused(matdb().args(["diagnose", "out/cloud.ply", "-o", "refused"]).args(arguments));

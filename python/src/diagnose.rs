@@ -251,11 +251,6 @@ fn inputs(clouds: &[CloudLike], names: &[PathBuf], scenes: &[&Scene]) -> Result<
     let mut known: Vec<(&Path, Input)> = Vec::new();
     for ((cloud, name), scene) in clouds.iter().zip(names).zip(scenes) {
         let of_cloud = cloud.input(name)?;
-        let is_file = matches!(cloud, CloudLike::File(_));
-        if !is_file && known.iter().any(|(_, other)| other.hash == of_cloud.hash) {
-            let problem = format!("the cloud {} is given twice", name.display());
-            return Err(Error::Usage { problem, way_out: "give each cloud once".to_owned() });
-        }
         let path = scene.path();
         for one in [(&**name, of_cloud), (path, input(path, scene.own_text().as_bytes()))] {
             if !known.contains(&one) {

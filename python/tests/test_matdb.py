@@ -1174,8 +1174,9 @@ def test_several_clouds_are_checked(drifting, tmp_path):
         md.diagnose(["a.ply", "a.ply"], "a.toml")
     assert str(twice.value) == said("a.ply", "a.ply", "--scene", "a.toml")
     cloud = md.Cloud.load("a.ply")
-    with pytest.raises(md.UsageError, match="points-2 is given twice"):
-        md.diagnose([cloud, md.Cloud.load("a.ply")], "a.toml")
+    for same in [md.Cloud.load("a.ply"), "a.ply"]:
+        with pytest.raises(md.UsageError, match="the clouds .* and .* have the same powers; give each measurement once"):
+            md.diagnose([cloud, same], "a.toml")
     with pytest.raises(md.UsageError, match="there is no cloud"):
         md.diagnose([], "a.toml")
     with pytest.raises(TypeError, match="give a matdb.Cloud"):

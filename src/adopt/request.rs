@@ -386,7 +386,20 @@ impl CheckedRequest<'_> {
             }
             absolute(read(path, ready.scene.radar())?, path)
         };
-        self.request.clouds().zip(self.scenes()).map(read_one).collect()
+        let clouds = self.request.clouds().zip(self.scenes()).map(read_one);
+        let clouds = clouds.collect::<Result<Vec<_>, _>>()?;
+        let paths: Vec<&Path> = self.request.clouds().collect();
+        for (number, cloud) in clouds.iter().enumerate() {
+            let same = clouds[..number].iter().position(|other| are_the_same(cloud, other));
+            if let Some(other) = same {
+                let [other, own] = [other, number].map(|number| paths[number].display());
+                return Err(Error::usage(
+                    format!("the clouds {other} and {own} have the same powers"),
+                    "give each measurement once",
+                ));
+            }
+        }
+        Ok(clouds)
     }
 
     /// Diagnoses the clouds, one for each scene; `hear` receives in a few words what is being done.
@@ -453,6 +466,15 @@ pub fn as_answer(error: Error) -> Result<DiagnoseError, Error> {
 /// Name of the file of a material that a scene names so.
 pub(super) fn material_file(name: &str) -> String {
     format!("material-{}.toml", name.replace(['@', ':'], "-"))
+}
+
+/// Whether two clouds are one measurement, perhaps by way of another file: all powers agree to what files keep of them.
+fn are_the_same(cloud: &Cloud, other: &Cloud) -> bool {
+    const KEPT: f64 = 1e-4;
+    let (own, others) = (cloud.points(), other.points());
+    let mut pairs = own.iter().zip(others);
+    own.len() == others.len()
+        && pairs.all(|(a, b)| (a.power_w - b.power_w).abs() <= KEPT * a.power_w.max(b.power_w))
 }
 
 /// Files that a scene names: meshes and a scan.
