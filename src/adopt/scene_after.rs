@@ -61,8 +61,8 @@ pub(super) fn entries(
     found: &[FoundEffect],
     level: Level,
 ) -> impl Iterator<Item = EffectEntry> + '_ {
-    let is_known = move |one: &&FoundEffect| one.level == level && find(one.name).is_some();
-    found.iter().filter(is_known).map(|one| EffectEntry {
+    let known = found.iter().filter(move |one| one.level == level && find(one.name).is_some());
+    known.map(|one| EffectEntry {
         name: one.name.to_owned(),
         source: None,
         parameters: one.parameters.iter().map(|(k, v)| ((*k).to_owned(), v.value)).collect(),

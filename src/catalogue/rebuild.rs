@@ -28,12 +28,7 @@ pub(super) fn check_rebuilt(
     if !scope.same_schema {
         return notes;
     }
-    let made = || {
-        let taken = [taken(bundle, sums, DATABASE)?, taken(bundle, sums, VIEW)?];
-        let about = read::<About>(bundle, ABOUT).map_err(|what| problem(ABOUT, what))?;
-        rebuilt(store, &about, bundle, taken, draw).map_err(|error| problem(DATABASE, error))
-    };
-    let made = match made() {
+    let made = match made_again(bundle, store, sums, draw) {
         Ok(made) => made,
         Err(what) => {
             problems.push(what);
@@ -57,6 +52,18 @@ pub(super) fn check_rebuilt(
         problems.push(problem(".", format!("{more} more files are not what its database gives")));
     }
     notes
+}
+
+/// The hashes of what this program makes of the database.
+fn made_again(
+    bundle: &Path,
+    store: &Store,
+    sums: &BTreeMap<String, String>,
+    draw: DrawView,
+) -> Result<BTreeMap<String, Checksum>, Problem> {
+    let taken = [taken(bundle, sums, DATABASE)?, taken(bundle, sums, VIEW)?];
+    let about = read::<About>(bundle, ABOUT).map_err(|what| problem(ABOUT, what))?;
+    rebuilt(store, &about, bundle, taken, draw).map_err(|error| problem(DATABASE, error))
 }
 
 /// The hash and the size of a file that is not made again.

@@ -402,12 +402,14 @@ impl Coordinates {
 
     /// The values of all parameters of a law of a program's own.
     fn own_values(&self, law: &OwnLaw, values: &[f64], at: &DVector<f64>) -> Vec<f64> {
-        let found = self.values(at);
-        let value = |(parameter, held): (&OwnParameter, &f64)| {
-            let place = self.list.iter().position(|coordinate| coordinate.name == parameter.name);
-            place.map_or(*held, |place| found[place])
-        };
-        law.parameters().iter().zip(values).map(value).collect()
+        let mut all = values.to_vec();
+        for (coordinate, value) in self.list.iter().zip(self.values(at)) {
+            let place = law.parameters().iter().position(|known| known.name == coordinate.name);
+            if let Some(place) = place {
+                all[place] = value;
+            }
+        }
+        all
     }
 
     /// ln σ⁰ of the model at a point of the search, as the beam sees it.

@@ -101,8 +101,8 @@ impl Choice {
     /// already.
     pub fn new(asked: &[&'static dyn Effect], declared: &[&str], measured: Measurands) -> Choice {
         let mut choice = Choice { tried: Vec::new(), not_tried: Vec::new() };
-        let is_own = |effect: &&&'static dyn Effect| find(effect.name()).is_none();
-        for effect in library().iter().chain(asked.iter().filter(is_own)) {
+        let own = asked.iter().filter(|effect| find(effect.name()).is_none());
+        for effect in library().iter().chain(own) {
             let name = effect.name();
             let is_asked = asked.iter().any(|other| other.name() == name);
             if let Some(reason) = reason_against(*effect, is_asked, declared, measured) {

@@ -20,7 +20,7 @@ use crate::radar::scan::Raster;
 use crate::radar::{Chirps, Pattern, Radar};
 use crate::render::{Echo, Truth};
 use crate::scene::file::{MeshEntry, RegionEntry};
-use crate::scene::{GivenMaterials, GivenMeshes, Scene, SceneFile, solids::icosphere};
+use crate::scene::{GivenMeshes, Scene, SceneFile, solids::icosphere};
 use crate::setup::ReadyScene;
 use crate::store::Store;
 use crate::units::dbm_from_watts;
@@ -156,8 +156,9 @@ impl Grid {
             meshes.insert(name, half_ball(*centre, radar_at));
         }
         let mut scene = Scene::resolve_given(file, Path::new(NAME), &meshes)?;
-        let named = |material: &Material| (material.slug.to_string(), material.clone());
-        scene.given = GivenMaterials::from_iter(materials.iter().map(named));
+        for material in materials {
+            scene.given.insert(material.slug.to_string(), material.clone());
+        }
         Ok(scene)
     }
 
