@@ -18,7 +18,7 @@ use matdb::store::{Addition, Store};
 use rusqlite::Connection;
 use rusqlite::functions::FunctionFlags;
 
-const NEWEST: &str = "schema-0015.sqlite";
+const NEWEST: &str = "schema-0016.sqlite";
 
 fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures")
@@ -647,6 +647,9 @@ fn views_show_people_decibels_and_degrees() {
     assert!((rows[1].0 - 28.6479).abs() < 1e-4 && (rows[1].1.unwrap() + 6.9897).abs() < 1e-4);
     assert_eq!((rows[2].1, rows[2].3.as_str()), (None, "left"));
     assert!((rows[2].2 + 30.0).abs() < 1e-9);
+    // What was typed: radians and ratios lose the last digits on the way and back.
+    let typed = "SELECT count(*) FROM v_curves WHERE sigma0_db <> round(sigma0_db, 9) OR theta_i_deg <> round(theta_i_deg, 9)";
+    assert_eq!(conn.query_row(typed, [], |row| row.get::<_, i64>(0)).unwrap(), 0);
     let count = |sql: &str| conn.query_row(sql, [], |row| row.get::<_, i64>(0)).unwrap();
     assert_eq!(count("SELECT count(*) FROM v_materials WHERE status = 'superseded'"), 2);
     assert_eq!(count("SELECT count(*) FROM v_materials WHERE frequency_min_ghz = 290"), 2);

@@ -1058,7 +1058,7 @@ def test_the_parameters_of_a_function_are_fitted(scene, tmp_path):
         curve.fit(own, fixed={"beta": 1})
     with pytest.raises(md.UsageError, match="cannot be called `looks`"):
         md.Material("own", lambda theta_deg, looks: -looks, parameters={"looks": (1, 0, 2)})
-    with pytest.raises(md.UsageError, match="gives nan dB at 0.0000° with {'m': "):
+    with pytest.raises(md.UsageError, match="gives NaN dB at 0.0000° with {'m': "):
         curve.fit(md.Material("own", lambda theta_deg, m: -m if m == 1 else np.nan, parameters={"m": (1, 0, 2)}))
     with pytest.raises(md.UsageError, match="columns is for the name of a material or of a file; leave it out"):
         md.fit(curve, columns={"a": "theta_deg"})

@@ -46,6 +46,7 @@ fn schemas(fill: Backlog) -> [M<'static>; LATEST] {
             include_str!("../../migrations/0015_record.sql"),
             move |tx: &Transaction| Ok(fill.run(tx)?),
         ),
+        M::up(include_str!("../../migrations/0016_as_typed.sql")),
     ]
 }
 

@@ -442,20 +442,6 @@ CREATE TABLE curve_levels (
     FOREIGN KEY (revision_id, curve) REFERENCES curve (revision_id, name) ON DELETE CASCADE
 ) STRICT, WITHOUT ROWID;
 
-CREATE VIEW v_curves AS
-SELECT slug, number AS revision, curve.name AS curve, source.kind AS kind,
-    theta_i_rad * 57.29577951308232 AS theta_i_deg, theta_r_rad * 57.29577951308232 AS theta_r_deg,
-    delta_phi_rad * 57.29577951308232 AS delta_phi_deg, theta_sd_rad * 57.29577951308232 AS theta_sd_deg,
-    10 * log10(sigma0) AS sigma0_db, censor, 10 * log10(threshold_sigma0) AS threshold_db, xt_m, yt_m,
-    footprint, beam_rad, coalesce(relative, 0) AS relative, coalesce(only_detected, 0) AS only_detected
-FROM material JOIN revision ON material_id = material.id AND number = current_revision
-JOIN curve ON curve.revision_id = revision.id
-JOIN source ON source.revision_id = revision.id AND source.key = curve.source
-JOIN observation
-    ON observation.revision_id = revision.id AND observation.curve = curve.name
-LEFT JOIN curve_illumination AS i ON i.revision_id = revision.id AND i.curve = curve.name
-LEFT JOIN curve_levels AS l ON l.revision_id = revision.id AND l.curve = curve.name;
-
 CREATE VIEW fit_estimate AS
 SELECT n.revision_id AS revision_id, n.fit AS fit, n.position AS position, n.name AS name,
     CAST(coalesce(p.value, json_extract(report, estimate || '.value')) AS REAL) AS value,
@@ -507,6 +493,23 @@ CREATE TABLE record (
     command_hash TEXT CHECK (length(command_hash) = 64),            -- command and its inputs
     origin_hash  TEXT CHECK (length(origin_hash) = 64)              -- catalogue it was imported from
 ) STRICT;
+
+CREATE VIEW v_curves AS
+SELECT slug, number AS revision, curve.name AS curve, source.kind AS kind,
+    round(theta_i_rad * 57.29577951308232, 9) AS theta_i_deg,
+    round(theta_r_rad * 57.29577951308232, 9) AS theta_r_deg,
+    round(delta_phi_rad * 57.29577951308232, 9) AS delta_phi_deg,
+    round(theta_sd_rad * 57.29577951308232, 9) AS theta_sd_deg,
+    round(10 * log10(sigma0), 9) AS sigma0_db, censor,
+    round(10 * log10(threshold_sigma0), 9) AS threshold_db, xt_m, yt_m,
+    footprint, beam_rad, coalesce(relative, 0) AS relative, coalesce(only_detected, 0) AS only_detected
+FROM material JOIN revision ON material_id = material.id AND number = current_revision
+JOIN curve ON curve.revision_id = revision.id
+JOIN source ON source.revision_id = revision.id AND source.key = curve.source
+JOIN observation
+    ON observation.revision_id = revision.id AND observation.curve = curve.name
+LEFT JOIN curve_illumination AS i ON i.revision_id = revision.id AND i.curve = curve.name
+LEFT JOIN curve_levels AS l ON l.revision_id = revision.id AND l.curve = curve.name;
 
 INSERT INTO unit VALUES ('aperture_m', 'm', 'diameter of the antenna');
 
