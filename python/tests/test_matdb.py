@@ -1,13 +1,11 @@
 """The bindings: the bytes of the command line, arrays that fit them, errors, interruption, threads and memory."""
 
-import contextlib
 import html
 import json
 import pickle
 import re
 import resource
 import signal
-import sqlite3
 import subprocess
 import sys
 import threading
@@ -1252,10 +1250,19 @@ def test_nothing_is_stored_where_something_is_refused(drifting):
 def test_an_answer_outlives_a_database_that_cannot_be_written(drifting):
     db = md.open("mine.sqlite")
     db.add("mannequin-paint")
-    with contextlib.closing(sqlite3.connect("mine.sqlite")) as other:
-        other.execute("BEGIN IMMEDIATE")
-        with pytest.raises(md.StoreError, match="locked|another program") as refused:
+    # Locks are those of processes.
+    hold = """
+import sqlite3
+held = sqlite3.connect("mine.sqlite")
+held.execute("BEGIN IMMEDIATE")
+print("held", flush=True)
+input()
+"""
+    with subprocess.Popen([sys.executable, "-c", hold], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout.readline() == "held\n"
+        with pytest.raises(md.StoreError, match="locked|another program|busy") as refused:
             md.diagnose("a.ply", "a.toml", db=db, add=True, **drifting)
+        other.communicate("done\n")
     why = refused.value.diagnosis
     assert [effect["name"] for effect in why.effects] == ["drift"] and why.stored == [] == why.scenes_after
     why.save("why")
