@@ -11,13 +11,14 @@ use matdb::material::{Input, Scale};
 use matdb::measure::{self, CloudPoint, CloudReading, PowerUnit};
 use matdb::setup::read_cloud;
 use matdb::units::dbm_from_watts;
-use numpy::{AllowTypeChange, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2, PyArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyCapsule, PyDict, PyTuple};
 
 use crate::arrow::{Column, stream};
 use crate::error::{UsageError, no_choice, raised};
+use crate::numbers;
 use crate::scan::Scan;
 use crate::scene::Scene;
 use crate::words::in_python;
@@ -130,31 +131,30 @@ impl Cloud {
     #[pyo3(signature = (xyz_m, power_dbm, *, chirp = None, range_m = None))]
     fn new<'py>(
         py: Python<'py>,
-        xyz_m: PyArrayLike2<'py, f64, AllowTypeChange>,
-        power_dbm: PyArrayLike1<'py, f64, AllowTypeChange>,
-        chirp: Option<PyArrayLike1<'py, f64, AllowTypeChange>>,
-        range_m: Option<PyArrayLike1<'py, f64, AllowTypeChange>>,
+        xyz_m: &Bound<'py, PyAny>,
+        power_dbm: &Bound<'py, PyAny>,
+        chirp: Option<&Bound<'py, PyAny>>,
+        range_m: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Cloud> {
-        let places = xyz_m.as_array();
+        let places = numbers::rows("xyz_m", xyz_m)?;
         let others = [("power_dbm", Some(power_dbm)), ("chirp", chirp), ("range_m", range_m)];
         let mut columns = Vec::new();
-        for (name, values) in &others {
+        for (name, values) in others {
             if let Some(values) = values {
-                columns.push(((*name).to_owned(), values.as_array().to_vec()));
+                columns.push((name.to_owned(), numbers::line(name, values)?));
             }
         }
-        let is_even = columns.iter().all(|(_, values)| values.len() == places.nrows());
-        if places.ncols() != 3 || !is_even {
+        if columns.iter().any(|(_, values)| values.len() != places.len()) {
             let lengths =
                 columns.iter().map(|(name, values)| format!("{name} ({},)", values.len()));
             return Err(PyValueError::new_err(format!(
-                "the shapes differ: xyz_m {:?}, {}; give (n, 3) and n of everything else",
-                places.shape(),
+                "the shapes differ: xyz_m ({}, 3), {}; give (n, 3) and n of everything else",
+                places.len(),
                 lengths.collect::<Vec<_>>().join(", ")
             )));
         }
         for (axis, name) in ["x_m", "y_m", "z_m"].into_iter().enumerate() {
-            columns.push((name.to_owned(), places.column(axis).to_vec()));
+            columns.push((name.to_owned(), places.iter().map(|place| place[axis]).collect()));
         }
         py.detach(|| Cloud::of_columns(columns)).map_err(raised)
     }

@@ -18,6 +18,7 @@ use crate::database::Database;
 use crate::diagnose::Diagnosis;
 use crate::error::{raised, warn};
 use crate::fit::What;
+use crate::own::refuse_inside;
 
 /// Finds the effects that a scattering law lacks to explain a measured curve.
 ///
@@ -70,6 +71,7 @@ pub(crate) fn diagnose_curve(
 ) -> PyResult<Diagnosis> {
     let has_columns = columns.is_some();
     let columns = columns.map_or(Ok(ColumnNames::default()), column_names)?;
+    refuse_inside()?;
     let diagnosed = py.detach(|| {
         let law = model.map(curve_law).transpose()?;
         let effects = curve_terms(&effects)?;

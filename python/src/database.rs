@@ -33,6 +33,7 @@ use crate::interrupt::interruptible;
 use crate::json::to_python;
 use crate::material::Material;
 use crate::measure::Measurement;
+use crate::own::refuse_inside;
 
 /// A database of materials: a SQLite file. Built-in materials are found, too, where the file does not have them.
 ///
@@ -192,6 +193,7 @@ fn curve_of(
 /// dict
 #[pyfunction]
 pub(crate) fn verify<'py>(py: Python<'py>, bundle: PathBuf) -> PyResult<Bound<'py, PyAny>> {
+    refuse_inside()?;
     let verified = py.detach(|| matdb::adopt::verify(&bundle));
     to_python(py, &verified.map_err(raised)?)
 }
@@ -367,6 +369,11 @@ impl Database {
             let problem = "details belong to a file or a fit; give one, or leave the details out";
             return Err(UsageError::new_err(problem));
         }
+        if names.iter().any(|one| one.is_instance_of::<Material>()) {
+            let problem =
+                "a Material is added as a file: material.save(path), and then db.add(files=[path])";
+            return Err(UsageError::new_err(problem));
+        }
         let names: Vec<String> = names.extract()?;
         let stored = py.detach(|| {
             let database = self.database();
@@ -526,6 +533,7 @@ impl Database {
             (None, Some(curve)) => Some(curve_of(curve, columns, frequency_hz)?),
             _ => return Err(UsageError::new_err("give a material, or a curve")),
         };
+        refuse_inside()?;
         let report = py.detach(|| {
             let store = Store::open_existing(&self.path)?;
             let name = material.unwrap_or_default();
@@ -633,6 +641,7 @@ impl Database {
         folder: PathBuf,
         about: Option<PathBuf>,
     ) -> PyResult<Bound<'py, PyAny>> {
+        refuse_inside()?;
         let published = py.detach(|| {
             let Some(store) = Store::open_existing(&self.path)? else {
                 return Err(Error::NoDatabase { path: self.path.clone() });

@@ -161,7 +161,7 @@ impl Effect {
             other => return Err(no_choice("level", other, "instrument, material or scene")),
         };
         let slug: Result<matdb::material::Slug, String> = name.parse();
-        slug.map_err(UsageError::new_err)?;
+        slug.map_err(|problem| UsageError::new_err(problem.replace("material name", "name")))?;
         if find(name).is_some() {
             let problem = format!("the library has an effect `{name}`; take another name");
             return Err(UsageError::new_err(problem));
@@ -251,7 +251,8 @@ impl Own {
             for (known, value) in self.about.parameters.iter().zip(values) {
                 named.set_item(known.name, value)?;
             }
-            let gains_db = own::levels_db(self.gain_db.bind(py), Shots { shots }, &named, count)?;
+            let gains_db =
+                own::levels_db(self.gain_db.bind(py), Shots { shots }, &named, (count, "chirps"))?;
             if gains_db.iter().any(|gain_db| gain_db.is_nan() || *gain_db > MOST_DB) {
                 let name = self.about.name;
                 let problem = format!(

@@ -9,7 +9,7 @@ use matdb::formats::ColumnNames;
 use matdb::material::FitReport;
 use matdb::setup;
 use matdb::units::{db_from_ratio, watts_from_dbm};
-use numpy::{PyArray1, PyArray2, PyArrayLike1};
+use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -349,12 +349,8 @@ impl Fit {
     }
 
     /// Backscatter of the fitted law, dB, as `Material.sigma0_db`.
-    fn sigma0_db<'py>(
-        &self,
-        py: Python<'py>,
-        theta_deg: PyArrayLike1<'py, f64, numpy::AllowTypeChange>,
-    ) -> Bound<'py, PyArray1<f64>> {
-        sigma0_db(py, &self.fit.fit.model, &theta_deg)
+    fn sigma0_db<'py>(&self, theta_deg: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        sigma0_db(&self.fit.fit.model, theta_deg)
     }
 
     /// All numbers with their deviations, as `matdb fit --json` prints them.

@@ -18,6 +18,7 @@ mod interrupt;
 mod json;
 mod material;
 mod measure;
+mod numbers;
 mod own;
 mod pose;
 mod scan;
@@ -66,6 +67,7 @@ mod _matdb {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        crate::own::note_process();
         let error = module.getattr("Error")?;
         error.setattr("file", module.py().None())?;
         error.setattr("hint", module.py().None())?;

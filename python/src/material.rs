@@ -8,7 +8,7 @@ use matdb::fit::{OwnLaw, OwnParameter};
 use matdb::material::{MaterialError, SampledMaterial, Slug, file};
 use matdb::setup::MaterialRevision;
 use matdb::units::db_from_ratio;
-use numpy::{PyArray1, PyArrayLike1};
+use numpy::PyArray1;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -16,6 +16,7 @@ use pyo3::types::{PyDict, PyTuple};
 use crate::error::{UsageError, no_choice, raised, warn};
 use crate::interrupt::Stop;
 use crate::json::{of_text, text_of, to_python};
+use crate::numbers;
 use crate::own::{self, dict_of};
 
 /// A material in one revision; or one of a function, for exploration.
@@ -148,14 +149,18 @@ impl Material {
 
 /// Backscatter of a law at angles in degrees, dB.
 pub(crate) fn sigma0_db<'py>(
-    py: Python<'py>,
     law: &Brdf,
-    theta_deg: &PyArrayLike1<'py, f64, numpy::AllowTypeChange>,
-) -> Bound<'py, PyArray1<f64>> {
-    let angles_deg = theta_deg.as_array();
+    theta_deg: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let angles_deg = numbers::line("theta_deg", theta_deg)?;
+    if let Some(outside) = angles_deg.iter().find(|angle| !(0.0..=90.0).contains(*angle)) {
+        let problem =
+            format!("{outside}° is out of the range; give angles of incidence from 0 to 90");
+        return Err(UsageError::new_err(problem));
+    }
     let levels_db =
         angles_deg.iter().map(|theta_deg| db_from_ratio(law.sigma0(theta_deg.to_radians())));
-    PyArray1::from_iter(py, levels_db)
+    Ok(PyArray1::from_iter(theta_deg.py(), levels_db))
 }
 
 /// Values of parameters by name.
@@ -177,6 +182,11 @@ fn parameter(name: String, given: &Bound<'_, PyAny>) -> PyResult<OwnParameter> {
         .extract::<(f64, f64, f64)>()
         .map_err(|_| PyTypeError::new_err(format!("parameters[{name:?}] is (start, low, high)")));
     let (start, min, max) = numbers?;
+    if !(min.is_finite() && max.is_finite() && min < max) {
+        return Err(UsageError::new_err(format!(
+            "parameters[{name:?}] = {given}: {min} to {max} is no range; give (start, low, high)"
+        )));
+    }
     Ok(OwnParameter { name, min, max, start })
 }
 
@@ -207,7 +217,7 @@ fn levels_db(
     angles_deg: &[f64],
 ) -> PyResult<Vec<f64>> {
     let of = PyArray1::from_slice(function.py(), angles_deg);
-    own::levels_db(function, of, named, angles_deg.len())
+    own::levels_db(function, of, named, (angles_deg.len(), "angles"))
 }
 
 /// Refuses levels that are no law: no numbers, or levels after there were none.
@@ -313,13 +323,9 @@ impl Material {
     /// Returns
     /// -------
     /// numpy.ndarray, shape (n,), float64
-    fn sigma0_db<'py>(
-        &self,
-        py: Python<'py>,
-        theta_deg: PyArrayLike1<'py, f64, numpy::AllowTypeChange>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    fn sigma0_db<'py>(&self, theta_deg: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let law = self.found.material.scattering().map_err(raised)?;
-        Ok(sigma0_db(py, &law, &theta_deg))
+        sigma0_db(&law, theta_deg)
     }
 
     /// All that is known of it, as `matdb show --json` prints it.

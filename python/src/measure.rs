@@ -19,6 +19,7 @@ use crate::arrow::{Column, stream};
 use crate::cloud::CloudLike;
 use crate::error::{UsageError, no_choice, raised};
 use crate::json::{of_text, text_of, to_python};
+use crate::own::refuse_inside;
 use crate::pose::PoseLike;
 use crate::scene::SceneLike;
 use crate::words::in_python;
@@ -118,6 +119,7 @@ pub(crate) fn measure(
     }
     let scene = scene.scene(py)?;
     let scene = scene.get();
+    refuse_inside()?;
     let measured = py.detach(|| {
         let start = pose.map_or(Ok(Start::default()), |pose| pose.start())?;
         let request = MeasurementRequest {

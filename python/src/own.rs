@@ -2,20 +2,36 @@
 
 use std::cell::Cell;
 use std::panic::resume_unwind;
+use std::sync::OnceLock;
 
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::error::UsageError;
+use crate::numbers;
 
 thread_local! {
     /// Whether this thread is in a function of the program.
     static IS_INSIDE: Cell<bool> = const { Cell::new(false) };
 }
 
+/// The process that loaded the module.
+static PROCESS: OnceLock<u32> = OnceLock::new();
+
+/// Notes the process that loads the module.
+pub(crate) fn note_process() {
+    PROCESS.get_or_init(std::process::id);
+}
+
 /// Refuses work that a function of the program asks for which the work calls: it would wait for the threads that wait for it.
+/// And work of a process that was forked: it has none of the threads that would do it.
 pub(crate) fn refuse_inside() -> PyResult<()> {
+    if PROCESS.get().is_some_and(|loaded_by| *loaded_by != std::process::id()) {
+        let problem = "this process was forked after matdb was loaded, and lacks its threads; start processes anew, as by \
+                       multiprocessing.get_context(\"spawn\")";
+        return Err(UsageError::new_err(problem));
+    }
     if IS_INSIDE.get() {
         let problem = "a function of an effect or of a law is called by the work, and cannot render, fit or diagnose itself; \
                        compute it before";
@@ -24,18 +40,28 @@ pub(crate) fn refuse_inside() -> PyResult<()> {
     Ok(())
 }
 
-/// The numbers, dB, that a function of the program gives for `count` of something. One number stands for all.
+/// The numbers, dB, that a function of the program gives for so many of something. One number stands for all.
 pub(crate) fn levels_db<'py>(
     function: &Bound<'py, PyAny>,
     of: impl IntoPyObject<'py>,
     named: &Bound<'py, PyDict>,
-    count: usize,
+    (count, what): (usize, &str),
 ) -> PyResult<Vec<f64>> {
-    let numpy = function.py().import("numpy")?;
     let of = of.into_bound_py_any(function.py())?;
-    let levels_db =
-        numpy.call_method1("asarray", (function.call((of,), Some(named))?, "float64"))?;
-    numpy.call_method1("broadcast_to", (levels_db, count))?.call_method0("tolist")?.extract()
+    let given = function.call((of,), Some(named))?;
+    if given.is_none() {
+        let problem = format!("the function gives None for {count} {what}; return numbers in dB");
+        return Err(UsageError::new_err(problem));
+    }
+    let array = numbers::array("what the function gives", &given)?;
+    let shape = array.getattr("shape")?;
+    match shape.extract::<Vec<usize>>()?[..] {
+        [] => Ok(vec![array.extract()?; count]),
+        [length] if length == count => array.call_method0("tolist")?.extract(),
+        _ => Err(UsageError::new_err(format!(
+            "the function gives an array of the shape {shape} for {count} {what}; give one number for each, or one for all"
+        ))),
+    }
 }
 
 /// What a function of the program gives that the work calls. The work cannot refuse: it unwinds with the error, as Ctrl-C

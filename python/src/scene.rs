@@ -9,7 +9,7 @@ use matdb::files::{folder_of, write_all};
 use matdb::formats::ply::write_mesh;
 use matdb::geometry::Mesh;
 use matdb::scene::{self, GivenMaterials, GivenMeshes, SceneFile, read_text};
-use numpy::{AllowTypeChange, PyArray1, PyArrayLike2, PyArrayMethods};
+use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyString, PyTuple};
@@ -19,6 +19,7 @@ use crate::effect::Effect;
 use crate::error::{UsageError, no_choice, raised, warn};
 use crate::json::{of_text, text_of, to_python};
 use crate::material::{Material, law_file};
+use crate::numbers;
 use crate::own::dict_of;
 
 /// Radar, scan and target. It never changes; `replace` makes another.
@@ -484,7 +485,8 @@ fn mesh_of(given: &Bound<'_, PyAny>) -> PyResult<Mesh> {
             (given.getattr("vertices").map_err(|_| refused())?, facets.map_err(|_| refused())?)
         }
     };
-    let [vertices, facets] = [vertices, facets].map(|one| numbers(&one).ok_or_else(refused));
+    let [vertices, facets] =
+        [vertices, facets].map(|one| numbers::rows("a mesh", &one).map_err(|_| refused()));
     let mut mesh = Mesh::default();
     mesh.vertices.extend(vertices?.into_iter().map(DVec3::from_array));
     for (number, corners) in facets?.into_iter().enumerate() {
@@ -497,14 +499,6 @@ fn mesh_of(given: &Bound<'_, PyAny>) -> PyResult<Mesh> {
         mesh.facets.push(corners.map(|one| one as u32));
     }
     Ok(mesh)
-}
-
-/// The rows of an array of three columns.
-fn numbers(given: &Bound<'_, PyAny>) -> Option<Vec<[f64; 3]>> {
-    let array: PyArrayLike2<'_, f64, AllowTypeChange> = given.extract().ok()?;
-    let rows = array.as_array();
-    (rows.ncols() == 3)
-        .then(|| rows.rows().into_iter().map(|row| [row[0], row[1], row[2]]).collect())
 }
 
 /// Sets a value in a table of tables.
@@ -526,12 +520,29 @@ fn set(table: &mut Table, key: &str, value: Value) -> PyResult<()> {
     }
 }
 
+/// Levels of tables and lists in a value; a scene has a handful.
+const MOST_LEVELS: usize = 32;
+
 /// A value of Python as one of TOML. A material goes into `materials`, and its name there stands for it.
 fn toml_value(
     key: &str,
     value: &Bound<'_, PyAny>,
     materials: &mut GivenMaterials,
 ) -> PyResult<Value> {
+    nested_value(key, value, materials, MOST_LEVELS)
+}
+
+/// The same within another value, with so many levels more at most.
+fn nested_value(
+    key: &str,
+    value: &Bound<'_, PyAny>,
+    materials: &mut GivenMaterials,
+    levels: usize,
+) -> PyResult<Value> {
+    let Some(levels) = levels.checked_sub(1) else {
+        let problem = format!("{key} has more than {MOST_LEVELS} levels, or contains itself");
+        return Err(UsageError::new_err(problem));
+    };
     if let Ok(material) = value.cast::<Material>() {
         let material = &material.get().found().material;
         let name = format!("{GIVEN}{}", material.slug);
@@ -554,7 +565,7 @@ fn toml_value(
         let mut table = Table::new();
         for (name, value) in dict {
             let name: String = name.extract()?;
-            let value = toml_value(&name, &value, materials)?;
+            let value = nested_value(&name, &value, materials, levels)?;
             table.insert(name, value);
         }
         Ok(table.into())
@@ -562,9 +573,9 @@ fn toml_value(
         Ok(path.extract::<String>()?.into())
     } else if value.hasattr("tolist")? {
         // Numbers and arrays of numpy.
-        toml_value(key, &value.call_method0("tolist")?, materials)
+        nested_value(key, &value.call_method0("tolist")?, materials, levels)
     } else if let Ok(items) = value.try_iter() {
-        let values = items.map(|item| toml_value(key, &item?, materials));
+        let values = items.map(|item| nested_value(key, &item?, materials, levels));
         Ok(values.collect::<PyResult<Vec<Value>>>()?.into())
     } else {
         Err(PyTypeError::new_err(format!("a scene has no such value as {key}={value}")))

@@ -918,8 +918,55 @@ def test_a_function_that_is_no_curve_is_said_so():
         md.Material("loud", lambda theta_deg: np.inf)
     with pytest.raises(ZeroDivisionError):
         md.Material("broken", lambda theta_deg: 1 / 0)
-    with pytest.raises(ValueError):
+    with pytest.raises(md.UsageError, match=r"shape \(3,\) for 1025 angles; give one number for each, or one for all"):
         md.Material("short", lambda theta_deg: theta_deg[:3])
+    with pytest.raises(md.UsageError, match=r"2.0 to 1.0 is no range; give \(start, low, high\)|2 to 1 is no range"):
+        md.Material("own", lambda theta_deg, m: -m, parameters={"m": (1, 2, 1)})
+    law = md.open()["cotton"]
+    for outside in [95, -1, np.nan, np.inf]:
+        with pytest.raises(md.UsageError, match="is out of the range; give angles of incidence from 0 to 90"):
+            law.sigma0_db([10, outside])
+    assert law.sigma0_db(10).shape == (1,) and law.sigma0_db([]).shape == (0,)
+    with pytest.raises(ValueError, match=r"theta_deg has the shape \(1, 2\); give an array of one dimension"):
+        law.sigma0_db([[1, 2]])
+
+
+def test_values_that_are_no_real_numbers_are_refused(scene):
+    places = np.ones((4, 3))
+    for powers in [np.array(["1"] * 4), np.ones(4, bool), np.ones(4) * 1j, np.arange(4).astype("M8[s]")]:
+        with pytest.raises(TypeError, match="power_dbm has values of type .*; give real numbers"):
+            md.Cloud(places, powers)
+    masked = np.ma.masked_array(np.full(4, -60.0), mask=[1, 0, 0, 0])
+    with pytest.raises(md.Error, match="power"):
+        md.Cloud(places, masked)
+    hidden = np.ma.masked_array(places, mask=[[1, 1, 1]] + [[0, 0, 0]] * 3)
+    assert len(md.Cloud(hidden, np.full(4, -60.0)).power_dbm) == 3
+    with pytest.raises(ValueError, match=r"xyz_m has the shape \(4,\); give \(n, 3\)"):
+        md.Cloud(np.ones(4), np.ones(4))
+    endless = {}
+    endless["a"] = endless
+    for value in [endless, [endless]]:
+        with pytest.raises(md.UsageError, match="has more than 32 levels, or contains itself"):
+            scene.replace(radar=value)
+    with pytest.raises(md.UsageError, match="added as a file"):
+        md.open().add(md.Material("mine", lambda theta_deg: -theta_deg))
+
+
+def test_a_process_that_was_forked_says_so(tmp_path):
+    program = """
+import os, matdb as md
+md.render("builtin:calibration-plate")
+child = os.fork()
+if child == 0:
+    try:
+        md.render("builtin:calibration-plate")
+    except md.UsageError as refused:
+        print(refused, flush=True)
+    os._exit(0)
+os.waitpid(child, 0)
+"""
+    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert "was forked after matdb was loaded" in done.stdout and "spawn" in done.stdout
 
 
 def test_a_function_is_a_base_model_of_a_diagnosis():
@@ -997,7 +1044,9 @@ def test_an_effect_of_a_function_is_checked(tmp_path, monkeypatch):
         (lambda shots, slope_db: 1 / 0, ZeroDivisionError, "division"),
         (lambda shots, slope_db: np.nan, md.UsageError, "effect `own` gives NaN"),
         (lambda shots, slope_db: np.inf, md.UsageError, "or more than 300 dB"),
-        (lambda shots, slope_db: np.zeros(len(shots) + 1), ValueError, "broadcast"),
+        (lambda shots, slope_db: np.zeros(len(shots) + 1), md.UsageError, "array of the shape .* for .* chirps; give one number for each"),
+        (lambda shots, slope_db: None, md.UsageError, "gives None for .* chirps"),
+        (lambda shots, slope_db: 1j, TypeError, "complex128; give real numbers"),
         (lambda shots, slope_db: md.render(bench) and 0, md.UsageError, "cannot render, fit or diagnose itself"),
         (lambda shots: 0.0, TypeError, "slope_db"),
     ]:
