@@ -9,6 +9,7 @@ use nalgebra::DVector;
 
 use super::error::FitError;
 use super::own_law::{OwnLaw, OwnParameter};
+pub(crate) use super::settings::LOOKS;
 use super::table::{Aspects, Table};
 use crate::brdf::{Brdf, Mixture, Parameter, ParameterError};
 use crate::radar::random::{Key, Purpose};
@@ -17,8 +18,6 @@ use crate::radar::random::{Key, Purpose};
 pub(crate) const SPECULAR_LEVEL: &str = "S";
 /// Name of the diffuse level R = k·r_s.
 pub(crate) const DIFFUSE_LEVEL: &str = "R";
-/// Name of the looks of the speckle.
-pub(crate) const LOOKS: &str = "looks";
 /// Range of the levels: a lobe of m = 0.001 is a million times its level, and 10⁻¹² is then 60 dB below a mirror.
 const LEVEL_RANGE: (f64, f64) = (1e-12, 1.0);
 /// Range of the looks: from far stronger than fully developed speckle to practically no speckle.

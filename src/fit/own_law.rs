@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use thiserror::Error;
 
-use super::coordinates::LOOKS;
+use super::settings::LOOKS;
 use crate::brdf::{Brdf, Lambert, ParameterError};
 use crate::material::sampled_law;
 

@@ -4,6 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use super::error::FitError;
 
+/// Name of the looks of the speckle among the numbers of a fit.
+pub(crate) const LOOKS: &str = "looks";
+
 /// Estimator of the parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
