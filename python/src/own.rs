@@ -24,14 +24,20 @@ pub(crate) fn note_process() {
     PROCESS.get_or_init(std::process::id);
 }
 
-/// Refuses work that a function of the program asks for which the work calls: it would wait for the threads that wait for it.
-/// And work of a process that was forked: it has none of the threads that would do it.
-pub(crate) fn refuse_inside() -> PyResult<()> {
+/// Refuses work of a process that was forked: it has none of the threads that would do it.
+pub(crate) fn refuse_forked() -> PyResult<()> {
     if PROCESS.get().is_some_and(|loaded_by| *loaded_by != std::process::id()) {
         let problem = "this process was forked after matdb was loaded, and lacks its threads; start processes anew, as by \
                        multiprocessing.get_context(\"spawn\")";
         return Err(UsageError::new_err(problem));
     }
+    Ok(())
+}
+
+/// The same, and work that a function of the program asks for which the work calls: it would wait for the threads that wait for
+/// it.
+pub(crate) fn refuse_inside() -> PyResult<()> {
+    refuse_forked()?;
     if IS_INSIDE.get() {
         let problem = "a function of an effect or of a law is called by the work, and cannot render, fit or diagnose itself; \
                        compute it before";

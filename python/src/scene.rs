@@ -20,7 +20,7 @@ use crate::error::{UsageError, no_choice, raised, warn};
 use crate::json::{of_text, text_of, to_python};
 use crate::material::{Material, law_file};
 use crate::numbers;
-use crate::own::dict_of;
+use crate::own::{dict_of, refuse_forked};
 
 /// Radar, scan and target. It never changes; `replace` makes another.
 ///
@@ -79,6 +79,7 @@ impl Scene {
         text: String,
         materials: GivenMaterials,
     ) -> PyResult<Scene> {
+        refuse_forked()?;
         let made = py.detach(|| -> Result<scene::Scene, matdb::error::Error> {
             let scene = self.scene.replace(parse(&text, &self.path)?, &self.path, &self.given)?;
             Ok(scene::Scene { given: materials, ..scene })
@@ -191,6 +192,7 @@ impl SceneLike {
 ///     A file that is not there, or is no scene.
 #[pyfunction]
 pub(crate) fn load_scene(py: Python<'_>, path: PathBuf) -> PyResult<Scene> {
+    refuse_forked()?;
     let load = || Scene::of_text(read_text(&path)?, &path, Arc::default(), GivenMaterials::new());
     py.detach(load).map_err(raised::<matdb::error::Error>)
 }
@@ -206,6 +208,7 @@ impl Scene {
         name: Option<&str>,
         tables: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Scene> {
+        refuse_forked()?;
         let (mut table, mut own) = (Table::new(), GivenMaterials::new());
         for (key, value) in tables.into_iter().flatten() {
             let key: String = key.extract()?;
@@ -235,6 +238,7 @@ impl Scene {
     /// A scene of a text of a scene file. Relative paths in it start from the folder of `path`.
     #[staticmethod]
     fn from_text(py: Python<'_>, text: String, path: PathBuf) -> PyResult<Scene> {
+        refuse_forked()?;
         let made = || Scene::of_text(text, &path, Arc::default(), GivenMaterials::new());
         py.detach(made).map_err(raised)
     }
@@ -380,6 +384,7 @@ impl Scene {
         materials: &str,
         effects: Vec<(Py<Effect>, Py<PyDict>)>,
     ) -> PyResult<Scene> {
+        refuse_forked()?;
         let mut meshes = GivenMeshes::new();
         for (name, mesh) in given {
             meshes.insert(name.extract()?, mesh_of(&mesh)?);

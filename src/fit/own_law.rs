@@ -94,7 +94,7 @@ impl OwnLaw {
     pub fn at(&self, values: &[f64]) -> Brdf {
         let given = sampled_law(|angles_deg| (self.sigma0_db)(values, angles_deg));
         let law = given.or_else(|_| sampled_law(|angles_deg| vec![NOTHING_DB; angles_deg.len()]));
-        law.unwrap_or_else(|_| Brdf::Lambert(Lambert { albedo: 0.0 }))
+        law.unwrap_or(Brdf::Lambert(Lambert { albedo: 0.0 }))
     }
 }
 
