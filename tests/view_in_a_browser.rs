@@ -1,6 +1,7 @@
 //! Promise: `view.html` shows the cloud of a rendering, of a diagnosis or of a catalogue in a real browser, from a folder: its points, their
 //! columns, thresholds and picked points; it says nothing on the console and asks for nothing else.
 
+use std::fs;
 use std::path::Path;
 
 use matdb::adopt::publish;
