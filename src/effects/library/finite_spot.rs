@@ -161,8 +161,10 @@ impl Sums {
             }
         }
         let f_per_sr = f_per_sr(&asked);
-        let mut powers =
-            rays.iter().zip(f_per_sr).map(|((weight, ray), f)| (weight * (ray.watts_per_f * f), ray));
+        let mut powers = rays
+            .iter()
+            .zip(f_per_sr)
+            .map(|((weight, ray), f)| (weight * (ray.watts_per_f * f), ray));
         let mut sums = Sums::default();
         if centre.region == region {
             sums.centre_w = powers.next().map_or(0.0, |(power_w, _)| power_w);
@@ -216,7 +218,8 @@ impl ShadedSpots {
                         diameter,
                         region,
                         |asked| {
-                            let seen = asked.iter().map(|&(beam_rad, v)| law.seen_by(beam_rad, v, v));
+                            let seen =
+                                asked.iter().map(|&(beam_rad, v)| law.seen_by(beam_rad, v, v));
                             seen.map(|seen| seen.f_per_sr).collect()
                         },
                         |beam_rad, v| law.seen_by(beam_rad, v, v).coherent_share,
@@ -232,7 +235,9 @@ impl ShadedSpots {
                         diameter,
                         region,
                         |asked| {
-                            let looks = asked.iter().map(|&(beam_rad, v)| Look { beam_rad, cos_theta: v.cos_theta() });
+                            let looks = asked
+                                .iter()
+                                .map(|&(beam_rad, v)| Look { beam_rad, cos_theta: v.cos_theta() });
                             shape.per_sr_of_each(&looks.collect::<Vec<_>>())
                         },
                         |beam_rad, _| shape.coherent_share(beam_rad),
