@@ -16,5 +16,6 @@ pub struct CatalogueView {
     pub places: BTreeMap<Slug, String>,
 }
 
-/// Draws the page of the materials of a database. The same database and [`About`] give the same bytes.
+/// Draws the page of the materials of a database. The same database and [`About`] give the same bytes on one machine, and the
+/// same places on every one.
 pub type DrawView = fn(&Store, &About) -> Result<CatalogueView, CatalogueError>;
