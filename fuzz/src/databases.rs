@@ -12,7 +12,7 @@ use matdb::formats::ColumnNames;
 use matdb::material::file::parse;
 use matdb::material::{Activity, Material, Slug, builtin, form};
 use matdb::measure::Curve;
-use matdb::report::{angles_deg, catalogue_view};
+use matdb::report::{CATALOGUE_VIEW, angles_deg};
 use matdb::store::{Filter, Store};
 use rusqlite::Connection;
 use rusqlite::config::DbConfig;
@@ -240,7 +240,7 @@ fn can_be_imported(bundle: &Path) -> bool {
     if !found.problems.is_empty() {
         return false;
     }
-    let import = Import::open(bundle, catalogue_view).expect("what was verified can be opened");
+    let import = Import::open(bundle, CATALOGUE_VIEW).expect("what was verified can be opened");
     let mut ours = Store::in_memory().expect("a database in memory");
     // Names that would mislead, and effects of a newer program, are refused here.
     let Ok(plan) = import.plan(None, None) else { return true };

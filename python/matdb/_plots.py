@@ -32,6 +32,7 @@ def scan(scan: Scan, ax: Any = None) -> Any:
 def measurement(measured: Measurement, ax: Any = None) -> Any:
     """The levels of a curve over the angle of incidence."""
     ax = _axes(ax)
+    ax.set_title("Measured levels")
     ax.plot(measured.theta_deg, measured.sigma0_db, ".", markersize=2, label="detected")
     silent = np.isnan(measured.sigma0_db)
     if silent.any():
@@ -47,7 +48,7 @@ def material(material: Material, ax: Any = None) -> Any:
     ax = _axes(ax)
     theta_deg = np.linspace(0, 89, 500)
     ax.plot(theta_deg, material.sigma0_db(theta_deg), label=material.name)
-    ax.set(xlabel="incidence, °", ylabel="σ⁰, dB")
+    ax.set(title="Backscatter", xlabel="incidence, °", ylabel="σ⁰, dB")
     ax.legend()
     return ax
 
@@ -57,9 +58,9 @@ def fit(fitted: Fit, ax: Any = None) -> Any:
     ax = _axes(ax)
     # A law over one angle is backscatter.
     retro = fitted.is_retro
-    theta_deg = np.linspace(0, float(np.nanmax(fitted.theta_deg)), 300)
+    theta_deg = np.linspace(float(np.nanmin(fitted.theta_deg)), float(np.nanmax(fitted.theta_deg)), 300)
     ax.plot(fitted.theta_deg[retro], fitted.levels_db[retro], ".", markersize=2, color="0.6", label="detected")
     ax.plot(theta_deg, fitted.sigma0_db(theta_deg), label="fit")
-    ax.set(xlabel="incidence, °", ylabel="σ⁰, dB")
+    ax.set(title=fitted.name, xlabel="incidence, °", ylabel="σ⁰, dB")
     ax.legend()
     return ax

@@ -18,6 +18,7 @@ use crate::database::Database;
 use crate::diagnose::Diagnosis;
 use crate::error::{raised, warn};
 use crate::fit::What;
+use crate::numbers::seed;
 use crate::own::refuse_inside;
 
 /// Finds the effects that a scattering law lacks to explain a measured curve.
@@ -67,7 +68,7 @@ pub(crate) fn diagnose_curve(
     effects: Vec<String>,
     curve: Option<&str>,
     columns: Option<&Bound<'_, PyDict>>,
-    seed: u64,
+    #[pyo3(from_py_with = seed)] seed: u64,
 ) -> PyResult<Diagnosis> {
     let has_columns = columns.is_some();
     let columns = columns.map_or(Ok(ColumnNames::default()), column_names)?;

@@ -1,6 +1,6 @@
 //! A database of materials.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf, absolute};
 
 use matdb::adopt::{
     CatalogueImport, CheckReport, CurveOrigin, DatabaseCheck, FitStorage, FitSubject,
@@ -40,13 +40,22 @@ use crate::own::refuse_inside;
 /// It holds no connection: each call opens the file, so that it may be pickled and used from any thread.
 #[pyclass(frozen, module = "matdb")]
 pub(crate) struct Database {
-    path: PathBuf,
+    /// As it was given.
+    given: PathBuf,
+    /// The same, from the root.
+    whole: PathBuf,
 }
 
 impl Database {
+    /// The file: as it was given, unless the program has gone to another folder since.
+    fn path(&self) -> &Path {
+        let is_here = absolute(&self.given).is_ok_and(|whole| whole == self.whole);
+        if is_here { &self.given } else { &self.whole }
+    }
+
     /// The file, if somebody has made it.
     pub(crate) fn read(&self) -> Result<Option<Store>, Error> {
-        Ok(Store::open_existing(&self.path)?)
+        Ok(Store::open_existing(self.path())?)
     }
 
     fn store(&self) -> PyResult<Option<Store>> {
@@ -59,7 +68,7 @@ impl Database {
     }
 
     pub(crate) fn database(&self) -> setup::Database {
-        setup::Database::new(Some(&self.path))
+        setup::Database::new(Some(self.path()))
     }
 
     /// Stores a fit under the name of a material.
@@ -207,7 +216,12 @@ pub(crate) fn verify<'py>(py: Python<'py>, bundle: PathBuf) -> PyResult<Bound<'p
 #[pyfunction]
 #[pyo3(signature = (path = PathBuf::from(setup::USUAL_DATABASE)))]
 pub(crate) fn open(path: PathBuf) -> PyResult<Database> {
-    let database = Database { path };
+    if path.as_os_str().is_empty() {
+        let problem = "the name of the database is empty; give a file, such as matdb.sqlite";
+        return Err(UsageError::new_err(problem));
+    }
+    let whole = absolute(&path).map_err(PyErr::from)?;
+    let database = Database { given: path, whole };
     // A file of another program is refused at once.
     database.store()?;
     Ok(database)
@@ -216,9 +230,9 @@ pub(crate) fn open(path: PathBuf) -> PyResult<Database> {
 #[pymethods]
 impl Database {
     /// The file.
-    #[getter]
-    fn path(&self) -> &PathBuf {
-        &self.path
+    #[getter(path)]
+    fn file(&self) -> &Path {
+        self.path()
     }
 
     /// Names of the materials in the file, sorted. Those that are built in come on top: `matdb.Database.builtin()`.
@@ -535,7 +549,7 @@ impl Database {
         };
         refuse_inside()?;
         let report = py.detach(|| {
-            let store = Store::open_existing(&self.path)?;
+            let store = Store::open_existing(self.path())?;
             let name = material.unwrap_or_default();
             let search = match given {
                 Some(search) => search,
@@ -616,7 +630,7 @@ impl Database {
         };
         let request = ExportRequest { material: name, format, curve, output: &path };
         let export = py.detach(|| {
-            let store = Store::open_existing(&self.path)?;
+            let store = Store::open_existing(self.path())?;
             let ExportReport { export, .. } = request.run(store.as_ref())?;
             write_all(folder_of(&path), &export.files)?;
             Ok(export)
@@ -643,8 +657,8 @@ impl Database {
     ) -> PyResult<Bound<'py, PyAny>> {
         refuse_inside()?;
         let published = py.detach(|| {
-            let Some(store) = Store::open_existing(&self.path)? else {
-                return Err(Error::NoDatabase { path: self.path.clone() });
+            let Some(store) = Store::open_existing(self.path())? else {
+                return Err(Error::NoDatabase { path: self.path().to_owned() });
             };
             let about = match &about {
                 None => About::of_publication(&folder).unwrap_or_default(),
@@ -703,11 +717,11 @@ impl Database {
     }
 
     fn __repr__(&self) -> PyResult<String> {
-        Ok(format!("<matdb.Database {}: {} materials>", self.path.display(), self.names()?.len()))
+        Ok(format!("<matdb.Database {}: {} materials>", self.path().display(), self.names()?.len()))
     }
 
     fn __reduce__(slf: &Bound<'_, Self>) -> PyResult<(Py<PyAny>, (PathBuf,))> {
         let open = slf.py().import("matdb")?.getattr("open")?;
-        Ok((open.unbind(), (slf.get().path.clone(),)))
+        Ok((open.unbind(), (slf.get().path().to_owned(),)))
     }
 }

@@ -21,10 +21,11 @@ use serde_json::{Value, json};
 
 use crate::cloud::CloudLike;
 use crate::database::Database;
-use crate::effect::Effect;
+use crate::effect::{Effect, refuse_taken};
 use crate::error::{UsageError, raised, warn};
 use crate::interrupt::interruptible;
 use crate::json::{of_text, text_of, to_python};
+use crate::numbers::seed;
 use crate::scene::{Scene, SceneLike};
 
 /// Name and bytes of a file.
@@ -120,7 +121,7 @@ pub(crate) fn diagnose(
     receiver: Option<&str>,
     effects: Vec<String>,
     own_effects: Vec<Py<Effect>>,
-    seed: u64,
+    #[pyo3(from_py_with = seed)] seed: u64,
     controls: bool,
     add: bool,
     material: Option<&str>,
@@ -144,10 +145,7 @@ pub(crate) fn diagnose(
     let effects = effects.collect::<PyResult<Vec<_>>>()?;
     let own: Vec<_> = own_effects.iter().map(|effect| effect.get().effect()).collect();
     for (number, effect) in own.iter().enumerate() {
-        if own[..number].iter().any(|other| other.name() == effect.name()) {
-            let problem = format!("two effects are called {}", effect.name());
-            return Err(UsageError::new_err(format!("{problem}; give one another name")));
-        }
+        refuse_taken(effect.name(), own[..number].iter().map(|other| other.name()))?;
     }
     let declared =
         scenes.iter().map(|scene| scene.own_effects(py)).collect::<PyResult<Vec<_>>>()?;

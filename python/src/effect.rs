@@ -127,6 +127,18 @@ fn usual_starts(parameters: &[EffectParameter]) -> Vec<Vec<f64>> {
     starts
 }
 
+/// Refuses an effect that has the name of an earlier one.
+pub(crate) fn refuse_taken(
+    name: &str,
+    mut earlier: impl Iterator<Item = &'static str>,
+) -> PyResult<()> {
+    if earlier.any(|other| other == name) {
+        let problem = format!("two effects are called {name}; give one another name");
+        return Err(UsageError::new_err(problem));
+    }
+    Ok(())
+}
+
 impl Effect {
     /// The effect as the library takes it.
     pub(crate) fn effect(&self) -> &'static dyn effects::Effect {

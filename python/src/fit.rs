@@ -24,6 +24,7 @@ use crate::interrupt::interruptible;
 use crate::json::{of_text, text_of, to_python};
 use crate::material::{Material, sigma0_db};
 use crate::measure::{Instrument, Measurement};
+use crate::numbers::seed_if_any;
 use crate::own::or_unwind;
 use crate::words::in_python;
 
@@ -157,7 +158,7 @@ pub(crate) fn fit(
     level_sd_db: Option<f64>,
     split_deg: Option<f64>,
     starts: Option<usize>,
-    seed: Option<u64>,
+    #[pyo3(from_py_with = seed_if_any)] seed: Option<u64>,
     fit_name: Option<&str>,
 ) -> PyResult<Fit> {
     let method = match method {

@@ -1,7 +1,27 @@
-//! Arrays of real numbers as arguments.
+//! Numbers and arrays of them as arguments.
 
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::{PyOverflowError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
+
+use crate::error::UsageError;
+
+/// A seed as an argument.
+pub(crate) fn seed(given: &Bound<'_, PyAny>) -> PyResult<u64> {
+    given.extract().map_err(|error: PyErr| {
+        if !error.is_instance_of::<PyOverflowError>(given.py()) {
+            return error;
+        }
+        let most = u64::MAX;
+        let problem =
+            format!("seed = {given} is out of range; give a whole number from 0 to {most}");
+        UsageError::new_err(problem)
+    })
+}
+
+/// The same, or None.
+pub(crate) fn seed_if_any(given: &Bound<'_, PyAny>) -> PyResult<Option<u64>> {
+    if given.is_none() { Ok(None) } else { seed(given).map(Some) }
+}
 
 /// An array of what is given, float64; what a mask hides is NaN.
 pub(crate) fn array<'py>(name: &str, given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {

@@ -21,6 +21,7 @@ use crate::cloud::Cloud;
 use crate::database::Database;
 use crate::error::{no_choice, raised, warn};
 use crate::interrupt::interruptible;
+use crate::numbers::seed_if_any;
 use crate::scene::{Scene, SceneLike};
 use crate::table;
 use crate::words::in_python;
@@ -108,7 +109,7 @@ pub(crate) fn render(
     py: Python<'_>,
     scene: SceneLike,
     db: Option<&Database>,
-    seed: Option<u64>,
+    #[pyo3(from_py_with = seed_if_any)] seed: Option<u64>,
     all_hits: bool,
     view: bool,
     glb: bool,

@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyString, PyTuple};
 use toml::{Table, Value};
 
-use crate::effect::Effect;
+use crate::effect::{Effect, refuse_taken};
 use crate::error::{UsageError, no_choice, raised, warn};
 use crate::json::{of_text, text_of, to_python};
 use crate::material::{Material, law_file};
@@ -317,10 +317,7 @@ impl Scene {
             let values = dict_of(&values)?;
             effect.get().with_values(&values)?;
             own.retain(|(other, _)| !other.is(effect));
-            if own.iter().any(|(other, _)| other.get().name() == effect.get().name()) {
-                let problem = format!("two effects are called {}", effect.get().name());
-                return Err(UsageError::new_err(format!("{problem}; give one another name")));
-            }
+            refuse_taken(effect.get().name(), own.iter().map(|(other, _)| other.get().name()))?;
             own.push((effect.clone().unbind(), values.unbind()));
         }
         Ok(Scene {

@@ -1074,6 +1074,9 @@ def lobe(theta_deg, r_s, alpha):
 def test_the_parameters_of_a_function_are_fitted(scene, tmp_path):
     curve = md.measure(md.render(md.load_scene("builtin:bench")), "builtin:bench")
     own = md.Material("own-lobe", lobe, parameters={"r_s": (0.1, 1e-4, 1), "alpha": (20, 0.1, 1000)})
+    # A slope alone is found, too.
+    falling = md.Material("falling", lambda theta_deg, a, b: a + b * theta_deg, parameters={"a": (-20, -80, 10), "b": (-0.5, -5, 0)})
+    assert md.fit("cotton", model=falling, fixed={"a": -8.4}).parameters["b"] == pytest.approx(-0.41, abs=0.01)
     assert np.allclose(own.sigma0_db([10]), lobe(10, 0.1, 20), atol=0.02)
     found = curve.fit(pickle.loads(pickle.dumps(own)))
     known = curve.fit("blinn-phong")
@@ -1135,6 +1138,29 @@ def test_what_is_missing_is_said(scene, monkeypatch):
             there.setitem(sys.modules, package, None)
             with pytest.raises(ModuleNotFoundError, match="this needs .*; pip install"):
                 call()
+
+
+def test_a_seed_out_of_range_is_refused_in_a_sentence(scene):
+    for given in [-1, 2**64]:
+        with pytest.raises(md.UsageError, match=rf"seed = {given} is out of range; give a whole number from 0 to 18446744073709551615"):
+            md.render(scene, seed=given)
+    with pytest.raises(TypeError, match="seed"):
+        md.render(scene, seed=1.5)
+
+
+def test_a_database_stays_the_same_file_in_another_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    db = md.open("lab.sqlite")
+    assert str(db.path) == "lab.sqlite"
+    db.add("cotton")
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir("elsewhere")
+    assert db.names() == ["cotton"] and db.path == tmp_path / "lab.sqlite"
+    db.add("steel")
+    assert pickle.loads(pickle.dumps(db)).names() == ["cotton", "steel"]
+    assert not (tmp_path / "elsewhere" / "lab.sqlite").exists()
+    with pytest.raises(md.UsageError, match="name of the database is empty; give a file"):
+        md.open("")
 
 
 def test_a_scan_is_a_cloud_of_open3d(scene):

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::provenance::activity;
 use crate::catalogue::{Import, ImportSummary, MaterialPlan, Outcome};
 use crate::error::Error;
-use crate::report::catalogue_view;
+use crate::report::CATALOGUE_VIEW;
 use crate::setup::Database;
 
 /// What is taken over, and how.
@@ -26,7 +26,7 @@ impl CatalogueImport<'_> {
     /// # Errors
     /// A catalogue that is damaged or cannot be read; a database that cannot be written.
     pub fn run(&self, database: &Database) -> Result<ImportSummary, Error> {
-        let import = Import::open(publication(self.bundle), catalogue_view)?;
+        let import = Import::open(publication(self.bundle), CATALOGUE_VIEW)?;
         // The database that is asked for may be made by this.
         let ours = if database.path().exists() { database.read()? } else { None };
         let materials = import.plan(ours.as_ref(), self.prefix)?;

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::catalogue::{
     About, CatalogueError, PublishSummary, Verification, publish_with, verify_with,
 };
-use crate::report::catalogue_view;
+use crate::report::CATALOGUE_VIEW;
 use crate::store::Store;
 
 /// Writes every material of a database as a catalogue into a folder, all of it or nothing.
@@ -20,7 +20,7 @@ pub fn publish(
     target: &Path,
     progress: impl FnMut(usize),
 ) -> Result<PublishSummary, CatalogueError> {
-    publish_with(store, about, target, catalogue_view, progress)
+    publish_with(store, about, target, CATALOGUE_VIEW, progress)
 }
 
 /// Checks a published folder, or a database by itself.
@@ -28,5 +28,5 @@ pub fn publish(
 /// # Errors
 /// When `bundle` is neither. Whatever is wrong inside is in [`Verification::problems`].
 pub fn verify(bundle: &Path) -> Result<Verification, CatalogueError> {
-    verify_with(bundle, catalogue_view)
+    verify_with(bundle, CATALOGUE_VIEW)
 }

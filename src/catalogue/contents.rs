@@ -10,22 +10,23 @@ use super::folder::{Checksum, Folder};
 use super::layout::{ABOUT, DATABASE, VIEW};
 use super::licence::licence_of_all;
 use super::site::Site;
-use super::view::DrawView;
+use super::view::CatalogueView;
 use super::{api, records, tables};
 use crate::store::Store;
 
-/// The hash of every file that publishing `store` over `published` would write. That of the database is given by
-/// `database`: a copy of a copy would count one more change in its header.
+/// The hash of every file that publishing `store` over `published` would write. Those of the database and of
+/// `view.html` are `taken`: a copy of a copy would count one more change in its header, and the last digits of rendered powers are
+/// those of a machine.
 pub(super) fn rebuilt(
     store: &Store,
     about: &About,
     published: &Path,
-    [database, view]: [Checksum; 2],
-    draw: DrawView,
+    taken: [Checksum; 2],
+    view: CatalogueView,
 ) -> Result<BTreeMap<String, Checksum>, CatalogueError> {
-    let taken = [(DATABASE.to_owned(), database), (VIEW.to_owned(), view)];
-    let mut folder = Folder::hashed(published, BTreeMap::from(taken))?;
-    write_contents(&mut folder, store, about, draw, |_| ())?;
+    let taken = [DATABASE, VIEW].map(str::to_owned).into_iter().zip(taken);
+    let mut folder = Folder::hashed(published, taken.collect())?;
+    write_contents(&mut folder, store, about, view, |_| ())?;
     Ok(folder.sums().clone())
 }
 
@@ -35,17 +36,16 @@ pub(super) fn write_contents(
     folder: &mut Folder,
     store: &Store,
     about: &About,
-    draw: DrawView,
+    view: CatalogueView,
     mut progress: impl FnMut(usize),
 ) -> Result<(usize, bool), CatalogueError> {
     folder.write(ABOUT, format!("{}\n", serde_json::json!(about)).as_bytes())?;
     // A licence that nobody declared is not recorded as declared: the next publication derives its own.
     let about = &About { licence: licence_of_all(store, about)?, ..about.clone() };
-    let view = draw(store, about)?;
-    // Powers of many rays, the last digits of which are those of a machine: a page that is there is taken by its checksum.
     if !folder.sums().contains_key(VIEW) {
-        folder.write(VIEW, &view.page)?;
+        folder.write(VIEW, &(view.draw)(store, about)?)?;
     }
+    let places = (view.places)(store)?;
     let (mut entries, mut site) = (Vec::new(), Site::new(about)?);
     for (number, summary) in store.list()?.iter().enumerate() {
         let Some(stored) = store.get(&summary.slug, None)? else {
@@ -55,7 +55,7 @@ pub(super) fn write_contents(
             ));
         };
         api::write(folder, &stored)?;
-        let place = view.places.get(&summary.slug).map(String::as_str);
+        let place = places.get(&summary.slug).map(String::as_str);
         site.add(folder, &stored, &store.history(&summary.slug)?, place)?;
         entries.push(Entry::new(summary, &stored));
         progress(number + 1);

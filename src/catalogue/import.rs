@@ -11,7 +11,7 @@ use super::error::CatalogueError;
 use super::layout::DATABASE;
 use super::read::{about, is_newer};
 use super::verify::{database, verify_with};
-use super::view::DrawView;
+use super::view::CatalogueView;
 use crate::effects::{Level, resolve};
 use crate::material::{Activity, Material, Origin, Slug};
 use crate::store::{Addition, Store, StoreError, StoredRevision};
@@ -75,11 +75,11 @@ pub struct ImportSummary {
 }
 
 impl Import {
-    /// Opens a published folder or its database after a complete check; `draw` as for [`verify_with`].
+    /// Opens a published folder or its database after a complete check; `view` as for [`verify_with`].
     ///
     /// # Errors
     /// When it is not a catalogue, anything in it is wrong, or a newer program made it.
-    pub fn open(bundle: &Path, draw: DrawView) -> Result<Import, CatalogueError> {
+    pub fn open(bundle: &Path, view: CatalogueView) -> Result<Import, CatalogueError> {
         if bundle.is_dir() && is_newer(bundle) {
             return Err(CatalogueError::Newer { bundle: bundle.to_owned() });
         }
@@ -89,7 +89,7 @@ impl Import {
         {
             return Err(newer.into());
         }
-        let problems = verify_with(bundle, draw)?.problems;
+        let problems = verify_with(bundle, view)?.problems;
         if let Some(first) = problems.first() {
             let others = match problems.len() - 1 {
                 0 => String::new(),

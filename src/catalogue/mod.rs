@@ -48,4 +48,4 @@ pub use publish::{PublishSummary, publish_with};
 pub use references::{Citable, Credit, Reference, references};
 pub use spectrum::{Spectrum, spectra};
 pub use verify::{Verification, verify_with};
-pub use view::{CatalogueView, DrawView};
+pub use view::CatalogueView;

@@ -9,7 +9,7 @@ use super::folder::Folder;
 use super::layout::{DATABASE, ZENODO};
 use super::licence::undeclared;
 use super::verify::check_staged;
-use super::view::DrawView;
+use super::view::CatalogueView;
 use crate::store::Store;
 
 /// What was published.
@@ -29,7 +29,7 @@ pub struct PublishSummary {
 
 /// Writes every material of a database as a catalogue into a folder, all of it or nothing.
 ///
-/// An earlier publication there is replaced. `draw` makes its `view.html`, and `progress` gets the number of materials
+/// An earlier publication there is replaced. `view` makes its `view.html`, and `progress` gets the number of materials
 /// done. [`adopt::publish`](crate::adopt::publish) has this program's page.
 ///
 /// # Errors
@@ -39,7 +39,7 @@ pub fn publish_with(
     store: &Store,
     about: &About,
     target: &Path,
-    draw: DrawView,
+    view: CatalogueView,
     progress: impl FnMut(usize),
 ) -> Result<PublishSummary, CatalogueError> {
     // A copy would be packed anew, and with it damage that shows in the original alone.
@@ -49,7 +49,7 @@ pub fn publish_with(
     let copy = folder.place(DATABASE, |place| Ok::<(), CatalogueError>(store.copy_to(place)?))?;
     let copy = Store::open_existing(copy)?.map(|copy| copy.known_as(store));
     let store = copy.as_ref().unwrap_or(store);
-    let (materials, is_version_reused) = write_contents(&mut folder, store, about, draw, progress)?;
+    let (materials, is_version_reused) = write_contents(&mut folder, store, about, view, progress)?;
     let published = PublishSummary {
         materials,
         files: folder.sums().len() + 1,

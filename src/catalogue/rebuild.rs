@@ -12,7 +12,7 @@ use super::layout::{ABOUT, DATABASE, INDEX, VIEW};
 use super::problem::{Problem, problem};
 use super::read::read;
 use super::tables::HAS_PARQUET;
-use super::view::DrawView;
+use super::view::CatalogueView;
 use crate::store::Store;
 
 /// Publishes once more, without writing, and compares file by file. Returns what was not compared, a sentence each.
@@ -20,7 +20,7 @@ pub(super) fn check_rebuilt(
     bundle: &Path,
     store: &Store,
     sums: &BTreeMap<String, String>,
-    draw: DrawView,
+    view: CatalogueView,
     problems: &mut Vec<Problem>,
 ) -> Vec<String> {
     let (scope, notes) = Scope::new(bundle, store, sums);
@@ -28,7 +28,7 @@ pub(super) fn check_rebuilt(
     if !scope.same_schema {
         return notes;
     }
-    let made = match made_again(bundle, store, sums, draw) {
+    let made = match made_again(bundle, store, sums, view) {
         Ok(made) => made,
         Err(what) => {
             problems.push(what);
@@ -59,11 +59,11 @@ fn made_again(
     bundle: &Path,
     store: &Store,
     sums: &BTreeMap<String, String>,
-    draw: DrawView,
+    view: CatalogueView,
 ) -> Result<BTreeMap<String, Checksum>, Problem> {
     let taken = [taken(bundle, sums, DATABASE)?, taken(bundle, sums, VIEW)?];
     let about = read::<About>(bundle, ABOUT).map_err(|what| problem(ABOUT, what))?;
-    rebuilt(store, &about, bundle, taken, draw).map_err(|error| problem(DATABASE, error))
+    rebuilt(store, &about, bundle, taken, view).map_err(|error| problem(DATABASE, error))
 }
 
 /// The hash and the size of a file that is not made again.

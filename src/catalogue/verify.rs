@@ -18,7 +18,7 @@ use super::listing::files;
 use super::problem::{Problem, problem};
 use super::read::{LARGEST_FILE_BYTES, LARGEST_TABLE_BYTES, read};
 use super::rebuild::check_rebuilt;
-use super::view::DrawView;
+use super::view::CatalogueView;
 use crate::files::FilesError;
 use crate::store::{Store, StoredRevision};
 
@@ -37,12 +37,12 @@ pub struct Verification {
     pub problems: Vec<Problem>,
 }
 
-/// Checks a published folder, or a database by itself. `draw` says where `view.html`, which counts by its checksum, shows a
+/// Checks a published folder, or a database by itself. `view` says where `view.html`, which counts by its checksum, shows a
 /// material. [`adopt::verify`](crate::adopt::verify) has this program's page.
 ///
 /// # Errors
 /// When `bundle` is neither. Whatever is wrong inside is in [`Verification::problems`].
-pub fn verify_with(bundle: &Path, draw: DrawView) -> Result<Verification, CatalogueError> {
+pub fn verify_with(bundle: &Path, view: CatalogueView) -> Result<Verification, CatalogueError> {
     let mut verified = Verification::default();
     let problems = &mut verified.problems;
     if bundle.is_file() {
@@ -72,7 +72,7 @@ pub fn verify_with(bundle: &Path, draw: DrawView) -> Result<Verification, Catalo
             verified.checked = check_content(bundle, &store, &sums, problems);
             // What is wrong already would be found wrong again in every file made of it.
             if problems.is_empty() {
-                verified.notes = check_rebuilt(bundle, &store, &sums, draw, problems);
+                verified.notes = check_rebuilt(bundle, &store, &sums, view, problems);
             }
         }
         Err(error) => problems.push(problem(DATABASE, error)),

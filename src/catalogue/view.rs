@@ -7,15 +7,13 @@ use super::error::CatalogueError;
 use crate::material::Slug;
 use crate::store::Store;
 
-/// `view.html` of a catalogue.
-#[derive(Clone, Debug, PartialEq)]
+/// What makes `view.html` of a catalogue.
+#[derive(Clone, Copy, Debug)]
 pub struct CatalogueView {
-    /// The bytes of the page, which asks for no other file.
-    pub page: Vec<u8>,
-    /// For every material that it shows, what stands behind `#` in the address so that the page shows this one.
-    pub places: BTreeMap<Slug, String>,
+    /// Renders the materials of a database, and gives the bytes of the page, which asks for no other file. The same
+    /// database and [`About`] give the same bytes on one machine.
+    pub draw: fn(&Store, &About) -> Result<Vec<u8>, CatalogueError>,
+    /// For every material that the page shows, what stands behind `#` in the address so that it shows this one: the same
+    /// on every machine.
+    pub places: fn(&Store) -> Result<BTreeMap<Slug, String>, CatalogueError>,
 }
-
-/// Draws the page of the materials of a database. The same database and [`About`] give the same bytes on one machine, and the
-/// same places on every one.
-pub type DrawView = fn(&Store, &About) -> Result<CatalogueView, CatalogueError>;

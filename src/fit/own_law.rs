@@ -194,6 +194,21 @@ mod tests {
     }
 
     #[test]
+    fn a_slope_alone_is_found() {
+        let parameters = vec![number("slope_db_per_deg", [-5.0, 0.0], -0.5)];
+        let falling = |values: &[f64], theta_deg: &[f64]| {
+            theta_deg.iter().map(|angle| values[0] * angle - 8.4).collect()
+        };
+        let falling = OwnLaw::new(parameters, falling).unwrap();
+        let truth = falling.at(&[-0.2]);
+        let curve = Twin { model: truth, rows: 600, ..Twin::default() }.curve(3);
+        let found = Fit::default().run_own(&falling, &curve).unwrap();
+        let slope = found.estimate("slope_db_per_deg").unwrap();
+        assert!(found.converged, "{found:?}");
+        assert!((slope.value + 0.2).abs() < 4.0 * slope.sd.unwrap(), "{slope:?}");
+    }
+
+    #[test]
     fn a_function_of_no_levels_ends_a_fit_without_a_panic() {
         for levels in [Vec::new(), vec![f64::NAN; 1025], vec![f64::INFINITY; 1025]] {
             let parameters = vec![number("m", [0.1, 1.0], 0.5)];

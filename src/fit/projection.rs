@@ -135,11 +135,12 @@ impl<'a> Projection<'a> {
         table.values().iter().map(|ln_sigma0| ln_sigma0.exp()).collect()
     }
 
-    /// The best amplitudes and looks at a place. Of several amplitudes each in turn is the first that explains the rows.
+    /// The best amplitudes and looks at a place. Of several amplitudes each in turn is the first that explains the rows; a law
+    /// whose levels are held has none.
     fn best(&self, law: &Law) -> Best {
         let alone: Vec<f64> = law.rises.iter().map(|rise| self.alone_ln(rise)).collect();
         let mut best = Best { cost: f64::INFINITY, amplitudes_ln: DVector::zeros(0), looks: 1.0 };
-        for first in 0..alone.len() {
+        for first in 0..alone.len().max(1) {
             let start = alone.iter().enumerate().map(|(index, ln)| {
                 let ln = if index == first { *ln } else { ln - BELOW };
                 ln.max(LEAST_LN)

@@ -554,6 +554,20 @@ mod tests {
     }
 
     #[test]
+    fn a_shape_is_found_where_the_level_is_held() {
+        let truth = Brdf::BlinnPhong(BlinnPhong { r_s: 0.01, alpha: 4.0 });
+        let curve = Twin { model: truth, rows: 600, ..Twin::default() }.curve(3);
+        let held = Fit { fixed: vec![("r_s".to_owned(), 0.01)], ..Fit::default() };
+        let start = Brdf::BlinnPhong(BlinnPhong { r_s: 0.01, alpha: 300.0 });
+        let found = held.run(&start, &curve).unwrap();
+        let alpha = found.estimate("alpha").unwrap();
+        assert!(
+            found.converged && (alpha.value - 4.0).abs() < 4.0 * alpha.sd.unwrap(),
+            "{found:?}"
+        );
+    }
+
+    #[test]
     fn looks_are_estimated_beside_the_model() {
         let twin = Twin { looks: 4.0, ..Twin::default() };
         let found = quick().run(&start(), &twin.curve(2)).unwrap();

@@ -58,4 +58,4 @@ pub use scan::{
 };
 pub use search::{MaterialHit, MaterialSearch};
 pub use shell::shell_word;
-pub use view::{catalogue_view, rendering_page};
+pub use view::{CATALOGUE_VIEW, rendering_page};

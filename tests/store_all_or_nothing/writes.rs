@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use matdb::adopt::Withdrawal;
 use matdb::catalogue::Import;
 use matdb::material::{Activity, Material, Status};
-use matdb::report::catalogue_view;
+use matdb::report::CATALOGUE_VIEW;
 use matdb::setup::Database;
 use matdb::store::{Store, StoreError};
 
@@ -98,7 +98,7 @@ impl Write {
     pub fn run(self, path: &Path, arm: impl Fn()) -> Result<(), Failure> {
         if let Write::Import = self {
             let by = Activity { command: "import".to_owned(), inputs: vec![], origin: None };
-            let import = Import::open(&theirs(path), catalogue_view)?;
+            let import = Import::open(&theirs(path), CATALOGUE_VIEW)?;
             let mut ours = Store::open(path)?;
             let plan = import.plan(Some(&ours), None)?;
             arm();

@@ -47,15 +47,23 @@ const LABEL_ROOM_M: f64 = 0.95 * PITCH_M;
 /// What the scene is called in an error.
 const NAME: &str = "view.html";
 
-/// Draws the page of all materials of a database.
-///
-/// All balls have the same size, range and beam, so that levels compare.
-///
-/// # Errors
-/// A database that cannot be read.
-pub fn catalogue_view(store: &Store, about: &About) -> Result<CatalogueView, CatalogueError> {
-    let drawn = Chosen::of(store).and_then(|chosen| draw(&chosen, about));
-    drawn.map_err(|error| CatalogueError::View(Box::new(error)))
+/// The page of all materials of a database. All balls have the same size, range and beam, so that levels compare.
+pub const CATALOGUE_VIEW: CatalogueView = CatalogueView { draw, places };
+
+/// Draws the page.
+fn draw(store: &Store, about: &About) -> Result<Vec<u8>, CatalogueError> {
+    Chosen::of(store).and_then(|chosen| page(&chosen, about)).map_err(failed)
+}
+
+/// Where it shows each material.
+fn places(store: &Store) -> Result<BTreeMap<Slug, String>, CatalogueError> {
+    let shown = Chosen::of(store).map_err(failed)?.materials;
+    let centres = Grid::new(shown.len()).centres.into_iter();
+    Ok(shown.into_iter().map(|one| one.slug).zip(centres.map(address)).collect())
+}
+
+fn failed(error: Error) -> CatalogueError {
+    CatalogueError::View(Box::new(error))
 }
 
 /// The materials that a page shows, and the others.
@@ -329,7 +337,7 @@ fn address(centre: DVec3) -> String {
 }
 
 /// Renders the balls and makes the page.
-fn draw(chosen: &Chosen, about: &About) -> Result<CatalogueView, Error> {
+fn page(chosen: &Chosen, about: &About) -> Result<Vec<u8>, Error> {
     let Chosen { materials, left_out, .. } = chosen;
     let grid = Grid::new(materials.len());
     let names: Vec<&str> = materials.iter().map(|one| one.slug.as_str()).collect();
@@ -357,9 +365,7 @@ fn draw(chosen: &Chosen, about: &About) -> Result<CatalogueView, Error> {
             notices: obstacles.chain(notices).collect(),
         }),
     };
-    let places = std::iter::zip(materials, &grid.centres);
-    let places = places.map(|(material, centre)| (material.slug.clone(), address(*centre)));
-    Ok(CatalogueView { page: page.bytes()?, places: places.collect() })
+    page.bytes()
 }
 
 #[cfg(test)]

@@ -8,6 +8,6 @@ mod labels;
 mod page;
 mod rendering;
 
-pub use catalogue::catalogue_view;
+pub use catalogue::CATALOGUE_VIEW;
 pub(super) use diagnosis::diagnosis_page;
 pub use rendering::rendering_page;
