@@ -40,7 +40,7 @@
 //! | [`store`] | the only SQL |
 //! | [`catalogue`] | a database as a catalogue for others: site, tables, records |
 //! | [`error`] | every error in one type |
-//! | [`setup`], [`report`], [`adopt`] | from names to a scene ready to render; what a person reads; what goes back into the database |
+//! | [`setup`], [`report`], [`adopt`], `dataset` | from names to a scene ready to render; what a person reads; what goes back into the database; many labelled scans |
 //! | [`cli`] | one command per file |
 //!
 //! Inside are SI units, watts and radians; dB, dBm and degrees appear where people and files do, and
@@ -72,6 +72,8 @@ pub mod error;
 pub mod setup;
 pub mod report;
 pub mod adopt;
+#[cfg(feature = "parquet")]
+pub mod dataset;
 pub mod cli;
 
 /// Runs the examples of the book's page about the library.

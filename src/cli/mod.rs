@@ -9,6 +9,8 @@ mod compare;
 mod completions;
 mod console;
 mod curves;
+#[cfg(feature = "parquet")]
+mod dataset;
 mod diagnose;
 mod diff;
 mod effects;
@@ -104,6 +106,8 @@ enum Command {
     Verify(verify::Args),
     Import(import::Args),
     Export(export::Args),
+    #[cfg(feature = "parquet")]
+    Dataset(dataset::Args),
     Completions(completions::Args),
     Man(man::Args),
 }
@@ -143,6 +147,8 @@ pub fn run(cli: &Cli) -> Result<(), Error> {
         Command::Verify(args) => verify::run(args, &console),
         Command::Import(args) => import::run(args, db, &console),
         Command::Export(args) => export::run(args, db, &console),
+        #[cfg(feature = "parquet")]
+        Command::Dataset(args) => dataset::run(args, db, &console),
         Command::Completions(args) => completions::run(args, Cli::command(), db),
         Command::Man(args) => man::run(args, Cli::command(), &console),
     }

@@ -12,6 +12,7 @@ mod error;
 pub mod exr;
 pub mod figure;
 pub mod glb;
+pub mod grey_png;
 mod guard;
 pub mod html;
 mod light;

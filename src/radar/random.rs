@@ -36,6 +36,8 @@ pub enum Purpose {
     Scatterers = 10,
     /// Places of these scatterers.
     Placement = 11,
+    /// What varies between the scans of a data set.
+    DataSet = 12,
 }
 
 /// Names one stream of draws.

@@ -38,6 +38,8 @@ pub struct Echo {
 pub struct Truth {
     /// First intersection of the path with the target.
     pub hit: Hit,
+    /// Mean power over speckle and noise, W: the sum of those of all paths that the receiver does not separate.
+    pub mean_power_w: f64,
     /// Region of that facet.
     pub region: u16,
     /// Standard deviation of the incidence angle over the rays of the spot, rad; 0 for a single ray.
@@ -119,7 +121,10 @@ impl Echoes<'_> {
             power_w: seen.map_or(0.0, |seen| seen.power_w),
             phase_rad,
             rank: 1,
-            truth: cause.map(|path| self.truth(chirp, hits, path)),
+            truth: cause.map(|path| Truth {
+                mean_power_w: paths.iter().filter(&near).map(|path| path.power_w).sum(),
+                ..self.truth(chirp, hits, path)
+            }),
         })
     }
 
@@ -132,6 +137,7 @@ impl Echoes<'_> {
         let edge_m = behind.map_or(&self.footprints.edge_m, |behind| &behind.edge_m);
         Truth {
             hit: path.hit,
+            mean_power_w: path.power_w,
             region: self.setup.geometry.region_of_facet[path.hit.facet as usize],
             theta_sd_rad: theta_sd_rad(hits),
             sheets: path.sheets,

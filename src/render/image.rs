@@ -206,6 +206,7 @@ mod tests {
         let hit = Hit { facet: 0, range_m: 8.0, point, cos_theta: 0.5 };
         let truth = Truth {
             hit,
+            mean_power_w: watts_from_dbm(power_dbm),
             region: 0,
             theta_sd_rad: 0.0,
             azimuth_rad: 0.0,

@@ -1,6 +1,7 @@
 //! What the radar looks at: meshes, where they stand, and which facets are made of what.
 
 pub mod builtin;
+mod change;
 mod error;
 pub mod file;
 mod load;
@@ -12,6 +13,7 @@ pub mod regions;
 pub mod solids;
 mod target;
 
+pub use change::KeyChange;
 pub use error::SceneError;
 pub use file::{BounceEntry, SceneFile};
 pub use load::{GivenMaterials, Scene};
@@ -19,4 +21,4 @@ pub(crate) use read::read_regular;
 pub use read::read_text;
 pub use reference::{ReferenceShape, ReferenceTarget};
 pub use regions::RegionError;
-pub use target::{BUILTIN_MESHES, GivenMeshes, MeshReport, Region, Target};
+pub use target::{BUILTIN_MESHES, GivenMeshes, MeshReport, Region, Target, file_mesh, placed_mesh};

@@ -88,6 +88,20 @@ pub type GivenMeshes = BTreeMap<String, Mesh>;
 const GIVEN: &str = "given:";
 
 impl MeshEntry {
+    /// The whole mesh of a file, where the file has it.
+    pub fn of_file(name: &str, file: &str) -> MeshEntry {
+        MeshEntry {
+            name: name.to_owned(),
+            file: file.to_owned(),
+            scale: 1.0,
+            size_m: None,
+            rotation_deg: [0.0; 3],
+            translation_m: [0.0; 3],
+            offset_m: None,
+            within_box: None,
+        }
+    }
+
     /// Whether it is read from a file, and is not built in or given.
     pub fn is_in_a_file(&self) -> bool {
         !self.file.starts_with("builtin:") && !self.file.starts_with(GIVEN)
@@ -112,7 +126,7 @@ impl Target {
                 return Err(value(path, &place, "is defined twice", "rename one"));
             }
             let (loaded, file_blake3) = load_mesh(entry, path, given)?;
-            let placed = cut(place(loaded, entry, path)?, entry, path)?;
+            let placed = put(loaded, entry, path)?;
             let at = |error| SceneError::Mesh { file: PathBuf::from(&entry.file), error };
             meshes.push(report(&placed, entry, file_blake3, mesh.facets.len()).map_err(at)?);
             match meshes.len() {
@@ -256,6 +270,31 @@ fn load_mesh(
     let (mesh, hash) = rayon::join(|| format.read(&bytes), || blake3::hash(&bytes));
     let mesh = mesh.map_err(|error| SceneError::Format { file, error })?;
     Ok((mesh, Some(hash.to_hex().to_string())))
+}
+
+/// The mesh of an entry as its file has it; as for a scene at `path`.
+///
+/// # Errors
+/// A mesh that cannot be read.
+pub fn file_mesh(entry: &MeshEntry, path: &Path, given: &GivenMeshes) -> Result<Mesh, SceneError> {
+    Ok(load_mesh(entry, path, given)?.0)
+}
+
+/// The mesh of an entry as a scene at `path` has it in the global frame.
+///
+/// # Errors
+/// A mesh that cannot be read or placed.
+pub fn placed_mesh(
+    entry: &MeshEntry,
+    path: &Path,
+    given: &GivenMeshes,
+) -> Result<Mesh, SceneError> {
+    put(file_mesh(entry, path, given)?, entry, path)
+}
+
+/// Places a mesh and cuts it.
+fn put(mesh: Mesh, entry: &MeshEntry, scene: &Path) -> Result<Mesh, SceneError> {
+    cut(place(mesh, entry, scene)?, entry, scene)
 }
 
 fn builtin(name: &str) -> Option<Mesh> {

@@ -159,7 +159,7 @@ impl Grid {
         let mut meshes = GivenMeshes::new();
         for (material, centre) in materials.iter().zip(&self.centres) {
             let name = material.slug.to_string();
-            file.mesh.push(mesh_entry(&name));
+            file.mesh.push(MeshEntry::of_file(&name, &format!("given:{name}")));
             file.region.push(region_entry(&name));
             meshes.insert(name, half_ball(*centre, radar_at));
         }
@@ -188,19 +188,6 @@ fn aim(radar: &Radar, xt_m: f64, yt_m: f64) -> DVec3 {
     let frames = radar.frames();
     let zt_m = target_z_m(xt_m, yt_m, frames.pattern_range_m, frames.reflector_centre);
     (frames.global_from_target * Point::new(xt_m, yt_m, zt_m.unwrap_or_default())).xyz
-}
-
-fn mesh_entry(name: &str) -> MeshEntry {
-    MeshEntry {
-        name: name.to_owned(),
-        file: format!("given:{name}"),
-        scale: 1.0,
-        size_m: None,
-        rotation_deg: [0.0; 3],
-        translation_m: [0.0; 3],
-        offset_m: None,
-        within_box: None,
-    }
 }
 
 /// All of the mesh of this name, of the material of this name.

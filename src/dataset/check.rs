@@ -1,0 +1,111 @@
+//! Whether a data set is complete and sound.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::time::{Duration, SystemTime};
+
+use serde::Serialize;
+
+use super::layout::{FOLDERS, SCANS};
+use super::plan::Dataset;
+use super::scan::ScanRow;
+
+/// Files that are being written are left alone for so long.
+const BEING_WRITTEN: Duration = Duration::from_secs(600);
+/// Problems that are named one by one.
+const MOST_NAMED: usize = 20;
+
+/// What was found of a data set.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct DatasetCheck {
+    /// Whether all of it is there and sound.
+    pub complete: bool,
+    /// Shards of the plan.
+    pub shards: u32,
+    /// Shards that are there as a whole.
+    pub done: u32,
+    /// Scans that they hold.
+    pub scans: u32,
+    /// Files of interrupted work that were removed.
+    pub swept: u32,
+    /// What is wrong or missing, a sentence each; the first twenty.
+    pub problems: Vec<String>,
+}
+
+impl Dataset {
+    /// Reads every file that is there, and removes what interrupted work has left.
+    pub fn check(&self) -> DatasetCheck {
+        let mut found = DatasetCheck {
+            shards: self.plan.shards,
+            swept: self.sweep(),
+            ..DatasetCheck::default()
+        };
+        let (mut problems, mut rows) = (Vec::new(), Vec::new());
+        for shard in 0..self.plan.shards {
+            match (self.damage_of(shard), self.manifest(shard)) {
+                (None, Ok(manifest)) => {
+                    found.done += 1;
+                    found.scans += manifest.scans.len() as u32;
+                    rows.extend(manifest.scans);
+                }
+                (problem, _) => {
+                    let name = self.recipe.split_of_shard(shard).shard_name(shard);
+                    problems.push(format!("shard {name} {}", problem.unwrap_or_default()));
+                }
+            }
+        }
+        problems.extend(self.leaks(&rows));
+        if found.done == found.shards && !self.folder.join(SCANS).is_file() {
+            problems.push(format!("{SCANS} is missing"));
+        }
+        found.complete = problems.is_empty();
+        let more = problems.len().saturating_sub(MOST_NAMED);
+        problems.truncate(MOST_NAMED);
+        if more > 0 {
+            problems.push(format!("{more} more"));
+        }
+        found.problems = problems;
+        found
+    }
+
+    /// What two splits share and should not, by what the scans themselves say.
+    fn leaks(&self, rows: &[ScanRow]) -> Vec<String> {
+        let mut of_options: BTreeMap<(&str, &str), BTreeSet<&str>> = BTreeMap::new();
+        for choice in self.recipe.spec.choose.iter().filter(|choice| choice.apart) {
+            for row in rows {
+                if let Some(option) = row.options.get(&choice.name) {
+                    of_options.entry((&choice.name, option)).or_default().insert(&row.split);
+                }
+            }
+        }
+        let mut leaks = Vec::new();
+        for ((choice, option), splits) in of_options {
+            if splits.len() > 1 {
+                let splits: Vec<&str> = splits.into_iter().collect();
+                leaks.push(format!(
+                    "option `{option}` of `{choice}` is in {}",
+                    splits.join(" and ")
+                ));
+            }
+        }
+        leaks
+    }
+
+    /// Removes temporary files that nobody has written to for a while.
+    fn sweep(&self) -> u32 {
+        let mut swept = 0;
+        let folders =
+            FOLDERS.iter().map(|name| self.folder.join(name)).chain([self.folder.clone()]);
+        for entry in folders.filter_map(|folder| fs::read_dir(folder).ok()).flatten().flatten() {
+            let is_temporary = entry.file_name().to_string_lossy().starts_with(".matdb-");
+            let changed = entry.metadata().and_then(|found| found.modified()).ok();
+            let is_old = changed.is_some_and(|changed| {
+                SystemTime::now().duration_since(changed).is_ok_and(|age| age > BEING_WRITTEN)
+            });
+            if is_temporary && is_old && fs::remove_file(entry.path()).is_ok() {
+                swept += 1;
+            }
+        }
+        swept
+    }
+}

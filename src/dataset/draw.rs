@@ -1,0 +1,142 @@
+//! What each scan of a data set draws: options, numbers, effects and materials. A draw depends on the seed, the target and the
+//! entry of the specification, and on nothing else.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use toml::Value;
+
+use super::effect::DrawnEffect;
+use super::layout::SPEC;
+use super::posterior::DrawnMaterial;
+use super::spec::{Choice, Spec, Variation, format_error};
+use super::split::Split;
+use crate::error::Error;
+use crate::radar::random::{Draws, Key, Purpose};
+use crate::scene::KeyChange;
+
+/// The kinds of draws of a scan, which share no stream.
+#[derive(Clone, Copy)]
+#[repr(u64)]
+pub(super) enum Kind {
+    Choice = 1,
+    Variation = 2,
+    Place = 3,
+    Posterior = 4,
+    Effect = 5,
+    Seed = 6,
+    Noise = 7,
+    Split = 8,
+}
+
+/// The stream of draws of one entry of the specification for one target, or scan.
+pub(super) fn stream(seed: u64, number: u64, kind: Kind, entry: usize) -> Draws {
+    let sub_ray = ((kind as u64) << 32) | entry as u64;
+    Key { seed, chirp: number, sub_ray, purpose: Purpose::DataSet }.draws()
+}
+
+/// What a scan draws before its meshes are placed.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Drawn {
+    /// Changes of the scene, in their order.
+    pub changes: Vec<KeyChange>,
+    /// The option of every choice, by its name.
+    pub options: BTreeMap<String, String>,
+    /// Every number that was drawn, by the key that it is for.
+    pub numbers: BTreeMap<String, f64>,
+}
+
+impl Drawn {
+    /// The options and numbers of a scan of a split.
+    ///
+    /// # Errors
+    /// A key that is none.
+    pub fn new(spec: &Spec, split: &Split, scan: u32) -> Result<Drawn, Error> {
+        let target = u64::from(scan / spec.repeats);
+        let mut drawn = Drawn::default();
+        for (entry, choice) in spec.choose.iter().enumerate() {
+            let mut draws = stream(spec.seed, target, Kind::Choice, entry);
+            drawn.choose(choice, &split.options[entry], draws.uniform())?;
+        }
+        for (entry, variation) in spec.vary.iter().enumerate() {
+            let mut draws = stream(spec.seed, target, Kind::Variation, entry);
+            drawn.vary(variation, &mut draws)?;
+        }
+        drawn.set("seed", whole(stream(spec.seed, target, Kind::Seed, 0)))?;
+        drawn.set("noise_seed", whole(stream(spec.seed, scan.into(), Kind::Noise, 0)))?;
+        Ok(drawn)
+    }
+
+    /// Takes one of some options of a choice, by their places.
+    fn choose(&mut self, choice: &Choice, options: &[usize], uniform: f64) -> Result<(), Error> {
+        let place = (uniform * options.len() as f64) as usize;
+        let option = &choice.option[options[place.min(options.len() - 1)]];
+        for (key, value) in &option.set {
+            self.set(key, value.clone())?;
+        }
+        self.options.insert(choice.name.clone(), option.name.clone());
+        Ok(())
+    }
+
+    fn vary(&mut self, variation: &Variation, draws: &mut Draws) -> Result<(), Error> {
+        let Variation { keys, from, to, mean, sd, values } = variation;
+        let value = if let (Some(from), Some(to)) = (from, to) {
+            let ends = std::iter::zip(from.list(), to.list());
+            let numbers: Vec<f64> =
+                ends.map(|(from, to)| from + (to - from) * draws.uniform()).collect();
+            from.value_of(&numbers)
+        } else if let (Some(mean), Some(sd)) = (mean, sd) {
+            let laws = std::iter::zip(mean.list(), sd.list());
+            let numbers: Vec<f64> = laws.map(|(mean, sd)| mean + sd * draws.gaussian()).collect();
+            mean.value_of(&numbers)
+        } else {
+            let place = (draws.uniform() * values.len() as f64) as usize;
+            values[place.min(values.len() - 1)].clone()
+        };
+        for key in keys {
+            self.note(key, &value);
+            self.set(key, value.clone())?;
+        }
+        Ok(())
+    }
+
+    fn set(&mut self, key: &str, value: impl Into<Value>) -> Result<(), Error> {
+        let place = Path::new(SPEC);
+        let change = KeyChange::new(key, value).map_err(|error| format_error(place, error))?;
+        self.changes.push(change);
+        Ok(())
+    }
+
+    /// Records the numbers of a value, those of a list with their places from 0.
+    fn note(&mut self, key: &str, value: &Value) {
+        match value {
+            Value::Float(number) => _ = self.numbers.insert(key.to_owned(), *number),
+            Value::Integer(number) => _ = self.numbers.insert(key.to_owned(), *number as f64),
+            Value::Array(values) => {
+                for (place, value) in values.iter().enumerate() {
+                    self.note(&format!("{key}.{place}"), value);
+                }
+            }
+            _ => (),
+        }
+    }
+
+    /// Records the effects and materials that were drawn.
+    pub fn note_all(&mut self, effects: &[DrawnEffect], materials: &[DrawnMaterial]) {
+        for DrawnEffect { entry, .. } in effects {
+            for (parameter, value) in &entry.parameters {
+                self.numbers.insert(format!("effect.{}.{parameter}", entry.name), *value);
+            }
+        }
+        for DrawnMaterial { name, numbers, .. } in materials {
+            for (path, value) in numbers {
+                self.numbers.insert(format!("material.{name}.{path}"), *value);
+            }
+        }
+    }
+}
+
+/// A whole number that TOML, JSON and floats of 64 bits hold.
+fn whole(mut draws: Draws) -> i64 {
+    (draws.uniform() * (1u64 << 53) as f64) as i64
+}

@@ -1,0 +1,147 @@
+//! Physical effects that a part of the scans has.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use super::draw::{Kind, stream};
+use super::spec::{EffectDraw, Spec};
+use crate::effects::{Level, find};
+use crate::error::Error;
+use crate::files::read_small;
+use crate::formats::EffectEntry;
+
+/// An effect as a scan has it.
+#[derive(Clone, Debug)]
+pub(super) struct DrawnEffect {
+    /// Its name and its numbers.
+    pub entry: EffectEntry,
+    /// What has it.
+    pub level: Level,
+    /// The material that has it, where it is one of materials.
+    pub material: Option<String>,
+}
+
+/// How a number of an effect is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Law {
+    Uniform([f64; 2]),
+    Normal { mean: f64, sd: f64 },
+}
+
+/// An effect and how its numbers are drawn.
+#[derive(Clone, Debug)]
+pub(super) struct EffectLaw {
+    share: f64,
+    level: Level,
+    name: String,
+    material: Option<String>,
+    /// Each with its range.
+    numbers: Vec<(String, Law, [f64; 2])>,
+}
+
+impl EffectLaw {
+    /// Checks an entry against the effects that there are; `copies` has the file of its report.
+    ///
+    /// # Errors
+    /// An effect or a parameter that there is not, a range beyond that of the parameter, and a report that did not find it.
+    pub fn new(draw: &EffectDraw, copies: &BTreeMap<String, PathBuf>) -> Result<EffectLaw, Error> {
+        let refused = |problem: String, way_out: String| {
+            Error::usage(format!("[[effect]] `{}`: {problem}", draw.name), way_out)
+        };
+        let Some(effect) = find(&draw.name) else {
+            return Err(refused(
+                "there is no such effect".to_owned(),
+                "`matdb effects` lists them".to_owned(),
+            ));
+        };
+        let level = effect.level();
+        if (level == Level::Material) != draw.material.is_some() {
+            let way_out = match level {
+                Level::Material => "give the material that has it, as material = \"NAME\"",
+                _ => "leave material out: it is no effect of a material",
+            };
+            return Err(refused(
+                format!("it is an effect of the {}", level.as_str()),
+                way_out.to_owned(),
+            ));
+        }
+        let laws = match &draw.report {
+            Some(report) => {
+                stated(copies.get(report).map_or(Path::new(report), PathBuf::as_path), &draw.name)?
+            }
+            None => draw
+                .parameters
+                .iter()
+                .map(|(name, ends)| (name.clone(), Law::Uniform(*ends)))
+                .collect(),
+        };
+        let mut numbers = Vec::new();
+        for (name, law) in laws {
+            let known = effect.parameters().iter().find(|known| known.name == name);
+            let Some(known) = known else {
+                let names: Vec<&str> = effect.parameters().iter().map(|known| known.name).collect();
+                let problem = format!("it has no parameter `{name}`");
+                return Err(refused(problem, format!("there are: {}", names.join(", "))));
+            };
+            if let Law::Uniform([from, to]) = law
+                && !(known.min <= from && to <= known.max)
+            {
+                let problem = format!("{name} from {from} to {to} is out of range");
+                return Err(refused(
+                    problem,
+                    format!("give values from {} to {}", known.min, known.max),
+                ));
+            }
+            numbers.push((name, law, [known.min, known.max]));
+        }
+        let (share, material) = (draw.share, draw.material.clone());
+        Ok(EffectLaw { share, level, name: draw.name.clone(), material, numbers })
+    }
+
+    /// The effect as a target has it; none where it has not.
+    pub fn draw(&self, spec: &Spec, target: u64, entry: usize) -> Option<DrawnEffect> {
+        let mut draws = stream(spec.seed, target, Kind::Effect, entry);
+        if draws.uniform() >= self.share {
+            return None;
+        }
+        let mut parameters = BTreeMap::new();
+        for (name, law, [min, max]) in &self.numbers {
+            let value = match *law {
+                Law::Uniform([from, to]) => from + (to - from) * draws.uniform(),
+                Law::Normal { mean, sd } => mean + sd * draws.gaussian(),
+            };
+            parameters.insert(name.clone(), value.clamp(*min, *max));
+        }
+        let entry = EffectEntry { name: self.name.clone(), source: None, parameters };
+        Some(DrawnEffect { entry, level: self.level, material: self.material.clone() })
+    }
+}
+
+/// The numbers that a diagnosis states of an effect, by their names.
+fn stated(report: &Path, name: &str) -> Result<Vec<(String, Law)>, Error> {
+    let refused = |problem: &str, way_out: &str| {
+        Error::usage(format!("{}: {problem}", report.display()), way_out.to_owned())
+    };
+    let text = read_small(report)?;
+    let record: Value = serde_json::from_slice(&text).map_err(|error| {
+        refused(&format!("is no JSON ({error})"), "name the report.json of a diagnosis")
+    })?;
+    let found = record["effects"].as_array().into_iter().flatten();
+    let Some(effect) = found.into_iter().find(|effect| effect["name"] == name) else {
+        let problem = format!("has not found the effect `{name}`");
+        return Err(refused(&problem, "name one that it found, or give parameters"));
+    };
+    let numbers = effect["parameters"].as_object().into_iter().flatten();
+    let laws: Vec<(String, Law)> = numbers
+        .filter_map(|(name, number)| {
+            let mean = number["value"].as_f64()?;
+            Some((name.clone(), Law::Normal { mean, sd: number["sd"].as_f64().unwrap_or(0.0) }))
+        })
+        .collect();
+    if laws.is_empty() {
+        return Err(refused("states no numbers of it", "give parameters"));
+    }
+    Ok(laws)
+}

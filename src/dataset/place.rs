@@ -1,0 +1,207 @@
+//! Puts a mesh on the surface of another, facing outwards, without cutting it.
+
+use std::path::Path;
+
+use glam::{DMat3, DVec3};
+
+use super::spec::Placing;
+use crate::error::Error;
+use crate::geometry::Mesh;
+use crate::radar::random::Draws;
+use crate::scene::file::{MeshEntry, SceneFile};
+use crate::scene::{GivenMeshes, placed_mesh};
+
+/// Places that are tried.
+const MOST_TRIES: usize = 200;
+/// How far the mesh may stand off the surface at its middle, m: beyond that the surface is no place for it.
+const MOST_LIFT_M: f64 = 0.04;
+/// How far from the surface's tangent plane what belongs to the same place may lie, m.
+const REACH_M: f64 = 0.2;
+/// Room between the mesh and what goes over it, m.
+const CLEARANCE_M: f64 = 5e-4;
+
+/// Where a mesh was put.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Put {
+    /// Turns about the fixed axes x, then y, then z, degrees.
+    pub rotation_deg: [f64; 3],
+    /// Shift after the turns, m.
+    pub translation_m: [f64; 3],
+}
+
+/// The part of a mesh that faces the radar.
+struct Surface {
+    mesh: Mesh,
+    /// Facets, their centres, their normals towards the radar, and the sums of their areas so far, m².
+    facets: Vec<(usize, DVec3, DVec3, f64)>,
+}
+
+/// A point of a surface and the frame of what is put there.
+struct Site {
+    point: DVec3,
+    /// Columns: across, upwards along the surface, and outwards.
+    axes: DMat3,
+}
+
+/// Puts a mesh where the draws say, and changes its entry in the scene.
+///
+/// # Errors
+/// A mesh that is not there, and a surface on which there is no place for it.
+pub(super) fn put(
+    placing: &Placing,
+    file: &mut SceneFile,
+    path: &Path,
+    meshes: &GivenMeshes,
+    draws: &mut Draws,
+) -> Result<Put, Error> {
+    let radar = file.radar.frames().origin().xyz;
+    let load = |entry: &MeshEntry| placed_mesh(entry, path, meshes);
+    let surface = Surface::new(load(entry(file, &placing.on)?)?, radar, placing);
+    let mut own = entry(file, &placing.mesh)?.clone();
+    (own.rotation_deg, own.translation_m) = ([0.0; 3], [0.0; 3]);
+    let object = load(&own)?;
+    let over: Vec<Mesh> = placing
+        .under
+        .iter()
+        .map(|name| Ok(load(entry(file, name)?)?))
+        .collect::<Result<_, Error>>()?;
+    let outline = Outline::of(&object);
+    for _ in 0..MOST_TRIES {
+        let Some(site) = surface.site(placing, &outline, draws) else { break };
+        let ground_m = heights_m(&surface.mesh, &site, &outline).fold(0.0, f64::max);
+        if ground_m > MOST_LIFT_M {
+            continue;
+        }
+        let base_m = ground_m + placing.gap_m;
+        let top_m = base_m + outline.max.z - outline.min.z;
+        let is_covered = over.iter().all(|mesh| {
+            let above = heights_m(mesh, &site, &outline).filter(|height_m| *height_m > 0.0);
+            above.reduce(f64::min).is_some_and(|least_m| least_m > top_m + CLEARANCE_M)
+        });
+        if !is_covered {
+            continue;
+        }
+        let translation = site.point + site.axes.z_axis * (base_m - outline.min.z);
+        let put =
+            Put { rotation_deg: euler_deg(&site.axes), translation_m: translation.to_array() };
+        let entry = file.mesh.iter_mut().find(|entry| entry.name == placing.mesh);
+        if let Some(entry) = entry {
+            (entry.rotation_deg, entry.translation_m) = (put.rotation_deg, put.translation_m);
+        }
+        return Ok(put);
+    }
+    let Placing { mesh, on, under, .. } = placing;
+    let (under, way_out) = match under[..] {
+        [] => (String::new(), "give a larger box, more tilt, or a smaller mesh"),
+        _ => (
+            format!(" under {}", under.join(", ")),
+            "give what goes over it an offset_m above the mesh's thickness, a larger box, or a smaller mesh",
+        ),
+    };
+    Err(Error::usage(
+        format!("[[place]]: of {MOST_TRIES} places on `{on}` none is one for `{mesh}`{under}"),
+        way_out,
+    ))
+}
+
+fn entry<'a>(file: &'a SceneFile, name: &str) -> Result<&'a MeshEntry, Error> {
+    file.mesh.iter().find(|entry| entry.name == name).ok_or_else(|| {
+        let known: Vec<&str> = file.mesh.iter().map(|entry| entry.name.as_str()).collect();
+        Error::usage(
+            format!("[[place]]: the scene has no mesh `{name}`"),
+            format!("there are: {}", known.join(", ")),
+        )
+    })
+}
+
+impl Surface {
+    fn new(mesh: Mesh, radar: DVec3, placing: &Placing) -> Surface {
+        let least_cosine = placing.most_tilt_deg.to_radians().cos();
+        let (mut facets, mut sum_m2) = (Vec::new(), 0.0);
+        for facet in 0..mesh.facets.len() {
+            let corners = mesh.facets[facet].map(|vertex| mesh.vertices[vertex as usize]);
+            let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
+            let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+            let (area_m2, to_radar) = (0.5 * normal.length(), (radar - centre).normalize_or_zero());
+            let cosine = normal.normalize_or_zero().dot(to_radar);
+            let is_inside = placing.within_box.is_none_or(|within| {
+                let (min, max) = (DVec3::from(within.min_m), DVec3::from(within.max_m));
+                centre.cmpge(min).all() && centre.cmple(max).all()
+            });
+            if cosine >= least_cosine && is_inside {
+                sum_m2 += area_m2;
+                facets.push((facet, centre, normal.normalize_or_zero(), sum_m2));
+            }
+        }
+        Surface { mesh, facets }
+    }
+
+    /// A point of it, each with the same probability, and the frame there; none on a surface without any.
+    fn site(&self, placing: &Placing, outline: &Outline, draws: &mut Draws) -> Option<Site> {
+        let all_m2 = self.facets.last()?.3;
+        let drawn_m2 = draws.uniform() * all_m2;
+        let place = self.facets.partition_point(|(.., sum_m2)| *sum_m2 <= drawn_m2);
+        let (facet, _, own_normal, _) = self.facets[place.min(self.facets.len() - 1)];
+        let [a, b, c] = self.mesh.facets[facet].map(|vertex| self.mesh.vertices[vertex as usize]);
+        let (root, share) = (draws.uniform().sqrt(), draws.uniform());
+        let point = a + root * ((1.0 - share) * (b - a) + share * (c - a));
+        // The mean over about what the mesh will cover: one facet may lie askew.
+        let radius_m = 0.25 * (outline.max - outline.min).truncate().element_sum();
+        let near = self.facets.iter().filter(|(_, centre, ..)| centre.distance(point) <= radius_m);
+        let normal: DVec3 = near.map(|(_, _, normal, _)| *normal).sum();
+        let outwards = normal.try_normalize().unwrap_or(own_normal);
+        let up = DVec3::Y.reject_from_normalized(outwards);
+        let up = up.try_normalize().unwrap_or_else(|| outwards.any_orthonormal_vector());
+        let [from, to] = placing.turn_deg;
+        let (sin, cos) = (from + (to - from) * draws.uniform()).to_radians().sin_cos();
+        let along = cos * up + sin * outwards.cross(up);
+        Some(Site { point, axes: DMat3::from_cols(along.cross(outwards), along, outwards) })
+    }
+}
+
+/// The box of a mesh along its own axes, m.
+struct Outline {
+    min: DVec3,
+    max: DVec3,
+}
+
+impl Outline {
+    fn of(mesh: &Mesh) -> Outline {
+        let none = Outline { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
+        mesh.vertices.iter().fold(none, |Outline { min, max }, vertex| Outline {
+            min: min.min(*vertex),
+            max: max.max(*vertex),
+        })
+    }
+
+    /// Whether a facet reaches over it or under it, by its box.
+    fn meets(&self, corners: &[DVec3; 3]) -> bool {
+        let [a, b, c] = *corners;
+        let (least, most) = (a.min(b).min(c).truncate(), a.max(b).max(c).truncate());
+        least.cmple(self.max.truncate()).all() && most.cmpge(self.min.truncate()).all()
+    }
+}
+
+/// Heights over the tangent plane of a site, m, of the vertices of those facets of a mesh that lie over or under what is put
+/// there. What lies far from the plane is of another part of the mesh.
+fn heights_m<'a>(
+    mesh: &'a Mesh,
+    site: &'a Site,
+    outline: &'a Outline,
+) -> impl Iterator<Item = f64> + 'a {
+    let to_site = site.axes.transpose();
+    let corners = mesh.facets.iter().map(move |facet| {
+        facet.map(|vertex| to_site * (mesh.vertices[vertex as usize] - site.point))
+    });
+    let near = corners.filter(|corners| {
+        outline.meets(corners) && corners.iter().all(|corner| corner.z.abs() <= REACH_M)
+    });
+    near.flat_map(|corners| corners.map(|corner| corner.z))
+}
+
+/// Turns about the fixed axes x, then y, then z that make a frame, degrees.
+fn euler_deg(axes: &DMat3) -> [f64; 3] {
+    let [x, y, z] = [axes.x_axis, axes.y_axis, axes.z_axis];
+    let turns = [y.z.atan2(z.z), (-x.z).clamp(-1.0, 1.0).asin(), x.y.atan2(x.x)];
+    turns.map(f64::to_degrees)
+}

@@ -1,0 +1,181 @@
+//! Everything that scans are made of, in memory: the specification, the scene with its meshes and its materials.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use super::draw::{Drawn, Kind, stream};
+use super::effect::{DrawnEffect, EffectLaw};
+use super::labels::Classes;
+use super::place::{self, Put};
+use super::posterior::{DrawnMaterial, Scatter};
+use super::spec::{Spec, format_error};
+use super::split::Split;
+use crate::effects::Level;
+use crate::error::Error;
+use crate::material::Material;
+use crate::radar::Pattern;
+use crate::scene::{GivenMaterials, GivenMeshes, Scene, SceneFile};
+use crate::setup::ReadyScene;
+
+/// A data set that can be made, scan by scan.
+pub(super) struct Recipe {
+    pub spec: Spec,
+    /// Where the scene was, for errors.
+    path: PathBuf,
+    /// The scene's text. Its meshes are `given:FILE`.
+    scene: String,
+    meshes: GivenMeshes,
+    materials: BTreeMap<String, Material>,
+    scatters: Vec<Scatter>,
+    effects: Vec<EffectLaw>,
+    copies: BTreeMap<String, PathBuf>,
+    pub splits: Vec<Split>,
+    pub classes: Classes,
+}
+
+/// One scan before it is traced.
+pub(super) struct Target {
+    pub ready: ReadyScene,
+    pub drawn: Drawn,
+    /// Where meshes were put.
+    pub placed: Vec<(String, Put)>,
+}
+
+impl Recipe {
+    /// Prepares a data set; `copies` are the files that the specification and the scene name.
+    ///
+    /// # Errors
+    /// What contradicts the scene or its materials.
+    pub fn new(
+        spec: Spec,
+        path: &Path,
+        scene: String,
+        meshes: GivenMeshes,
+        materials: BTreeMap<String, Material>,
+        copies: BTreeMap<String, PathBuf>,
+    ) -> Result<Recipe, Error> {
+        let mut scatters = Vec::new();
+        for posterior in &spec.posterior {
+            let Some(material) = materials.get(&posterior.material) else {
+                let known: Vec<&str> = materials.keys().map(String::as_str).collect();
+                return Err(Error::usage(
+                    format!(
+                        "[[posterior]]: no region of the scene has the material `{}`",
+                        posterior.material
+                    ),
+                    format!("there are: {}", known.join(", ")),
+                ));
+            };
+            scatters.push(Scatter::new(posterior, material)?);
+        }
+        let effects = spec.effect.iter().map(|draw| EffectLaw::new(draw, &copies));
+        let effects = effects.collect::<Result<Vec<_>, _>>()?;
+        let splits = Split::all(&spec);
+        let file = SceneFile::parse(&scene).map_err(|error| format_error(path, error))?;
+        let classes = Classes::new(&spec, &file, materials.keys())?;
+        let path = path.to_owned();
+        Ok(Recipe {
+            spec,
+            path,
+            scene,
+            meshes,
+            materials,
+            scatters,
+            effects,
+            copies,
+            splits,
+            classes,
+        })
+    }
+
+    /// The split of a shard.
+    pub fn split_of_shard(&self, shard: u32) -> &Split {
+        let place = self.splits.partition_point(|split| split.first_shard + split.shards <= shard);
+        &self.splits[place.min(self.splits.len() - 1)]
+    }
+
+    /// The split of a scan.
+    pub fn split_of_scan(&self, scan: u32) -> &Split {
+        let place = self.splits.partition_point(|split| split.first + split.scans <= scan);
+        &self.splits[place.min(self.splits.len() - 1)]
+    }
+
+    /// Number of all shards.
+    pub fn shards(&self) -> u32 {
+        self.splits.iter().map(|split| split.shards).sum()
+    }
+
+    /// The scene of a scan, with everything drawn and placed.
+    ///
+    /// # Errors
+    /// A scene that cannot be, by the scan's name.
+    pub fn target(&self, scan: u32) -> Result<Target, Error> {
+        self.target_or(scan).map_err(|error| match error {
+            Error::Usage { problem, way_out } => {
+                Error::Usage { problem: format!("scan {}: {problem}", self.key(scan)), way_out }
+            }
+            other => other,
+        })
+    }
+
+    fn target_or(&self, scan: u32) -> Result<Target, Error> {
+        let spec = &self.spec;
+        let target = u64::from(scan / spec.repeats);
+        let mut drawn = Drawn::new(spec, self.split_of_scan(scan), scan)?;
+        let effects: Vec<DrawnEffect> = self
+            .effects
+            .iter()
+            .enumerate()
+            .filter_map(|(entry, law)| law.draw(spec, target, entry))
+            .collect();
+        let scatters = self.scatters.iter().enumerate();
+        let materials: Vec<DrawnMaterial> = scatters
+            .map(|(entry, scatter)| scatter.draw(spec, target, entry))
+            .collect::<Result<_, _>>()?;
+        drawn.note_all(&effects, &materials);
+
+        let file = SceneFile::parse_changed(&self.scene, &drawn.changes);
+        let mut file = file.map_err(|error| format_error(&self.path, error))?;
+        file.name = self.key(scan);
+        for entry in &mut file.mesh {
+            if entry.is_in_a_file() || entry.file.starts_with("builtin:") {
+                entry.file = format!("given:{}", entry.file);
+            }
+        }
+        if let Pattern::Rays(explicit) | Pattern::Angles(explicit) = &mut file.radar.scan
+            && let Some(copy) = self.copies.get(&explicit.file)
+        {
+            // As seen from the folder of the scene.
+            explicit.file = copy.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        }
+        let mut placed = Vec::new();
+        for (entry, placing) in spec.place.iter().enumerate() {
+            let mut draws = stream(spec.seed, target, Kind::Place, entry);
+            let put = place::put(placing, &mut file, &self.path, &self.meshes, &mut draws)?;
+            placed.push((placing.mesh.clone(), put));
+        }
+        let mut given: GivenMaterials = self.materials.clone();
+        given.extend(materials.into_iter().map(|one| (one.name, one.material)));
+        for DrawnEffect { entry, level, material } in effects {
+            match level {
+                Level::Instrument => file.radar.effect.push(entry),
+                Level::Scene => file.effect.push(entry),
+                Level::Material => {
+                    if let Some(material) = material.and_then(|name| given.get_mut(&name)) {
+                        material.effects.push(entry);
+                    }
+                }
+            }
+        }
+        let mut scene = Scene::resolve_given(file, &self.path, &self.meshes)?;
+        scene.given = given;
+        let ready = ReadyScene::new(scene, &self.path, None)?;
+        Ok(Target { ready, drawn, placed })
+    }
+
+    /// Name of a scan: `train-000012`.
+    pub fn key(&self, scan: u32) -> String {
+        let split = self.split_of_scan(scan);
+        format!("{}-{:06}", split.name, scan - split.first)
+    }
+}

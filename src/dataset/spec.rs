@@ -1,0 +1,485 @@
+//! What a data set is made of: a scene, what varies in it, and how its scans are split.
+//!
+//! ```toml
+//! name = "concealed"
+//! scene = "torso.toml"          # beside this file, or builtin:NAME
+//! scans = 1000
+//! objects = ["plate"]           # meshes that are looked for
+//! split = { train = 0.8, test = 0.2 }
+//!
+//! [[choose]]                    # one of several; none of them is in two splits
+//! name = "person"
+//! apart = true
+//! option = [
+//!     { name = "tall", set = { "mesh.body.size_m" = [0.5, 1.9, 0.3] } },
+//!     { name = "short", set = { "mesh.body.size_m" = [0.5, 1.6, 0.3] } },
+//! ]
+//!
+//! [[vary]]                      # numbers between two ends
+//! keys = ["mesh.body.rotation_deg"]
+//! from = [0, -20, 0]
+//! to = [0, 20, 0]
+//!
+//! [[place]]                     # on a surface, without cutting it
+//! mesh = "plate"
+//! on = "body"
+//! ```
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use toml::Value;
+
+use crate::error::Error;
+use crate::formats::FormatError;
+use crate::formats::text::from_toml;
+use crate::scene::SceneError;
+use crate::scene::file::BoxEntry;
+
+/// A data set as its file describes it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Spec {
+    /// Short name, part of the names of archives: small letters, digits and hyphens.
+    pub name: String,
+    /// Title.
+    #[serde(default)]
+    pub title: String,
+    /// What it is for, in a few sentences.
+    #[serde(default)]
+    pub description: String,
+    /// Who makes it.
+    #[serde(default)]
+    pub creators: Vec<String>,
+    /// SPDX expression of its licence.
+    #[serde(default)]
+    pub licence: String,
+    /// The scene in which something varies: a file beside this one, or `builtin:NAME`.
+    pub scene: String,
+    /// Number of scans, 1 to 10 million.
+    pub scans: u32,
+    /// Seed of everything that is drawn.
+    #[serde(default)]
+    pub seed: u64,
+    /// Scans of the same target one after the other, which differ in the noise alone.
+    #[serde(default = "one")]
+    pub repeats: u32,
+    /// Meshes that are looked for, by name.
+    #[serde(default)]
+    pub objects: Vec<String>,
+    /// Most scans in one shard, which is made as a whole or not at all.
+    #[serde(default = "usual_shard")]
+    pub scans_per_shard: u32,
+    /// Whether there are images beside the points.
+    #[serde(default = "yes")]
+    pub images: bool,
+    /// Shares of the scans, by the names of the splits; all are `train` unless stated.
+    #[serde(default)]
+    pub split: BTreeMap<String, f64>,
+    /// Choices, in the order in which they are applied.
+    #[serde(default)]
+    pub choose: Vec<Choice>,
+    /// Numbers that vary.
+    #[serde(default)]
+    pub vary: Vec<Variation>,
+    /// Meshes that are put on others.
+    #[serde(default)]
+    pub place: Vec<Placing>,
+    /// Materials whose fits are drawn.
+    #[serde(default)]
+    pub posterior: Vec<Posterior>,
+    /// Physical effects that a part of the scans has.
+    #[serde(default)]
+    pub effect: Vec<EffectDraw>,
+}
+
+/// One of several ways to set keys of the scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Choice {
+    /// Name.
+    pub name: String,
+    /// Whether no option is in two splits.
+    #[serde(default)]
+    pub apart: bool,
+    /// The options.
+    pub option: Vec<ChoiceOption>,
+}
+
+/// One way to set keys of the scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ChoiceOption {
+    /// Name, unique in its choice.
+    pub name: String,
+    /// Values by their keys, as `matdb render --set` takes them.
+    #[serde(default)]
+    pub set: BTreeMap<String, Value>,
+    /// The split that it belongs to, where the options are kept apart; drawn unless stated.
+    #[serde(default)]
+    pub split: Option<String>,
+}
+
+/// Numbers that are drawn for keys of the scene: between two ends, about a mean, or one of several values.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Variation {
+    /// Keys that all get what is drawn.
+    pub keys: Vec<String>,
+    /// Lower end, a number or a list of numbers.
+    #[serde(default)]
+    pub from: Option<Numbers>,
+    /// Upper end.
+    #[serde(default)]
+    pub to: Option<Numbers>,
+    /// Mean of a normal law.
+    #[serde(default)]
+    pub mean: Option<Numbers>,
+    /// Its standard deviation.
+    #[serde(default)]
+    pub sd: Option<Numbers>,
+    /// Values of which one is taken, each as often.
+    #[serde(default)]
+    pub values: Vec<Value>,
+}
+
+/// A number, or several at once.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged, expecting = "expected a number or a list of numbers")]
+pub enum Numbers {
+    /// One.
+    One(f64),
+    /// Several.
+    Several(Vec<f64>),
+}
+
+/// A mesh that is put on the surface of another, and does not cut it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Placing {
+    /// The mesh; its own z axis will point away from the surface.
+    pub mesh: String,
+    /// The mesh that it is put on.
+    pub on: String,
+    /// Meshes that go over both, such as clothes.
+    #[serde(default)]
+    pub under: Vec<String>,
+    /// Where its middle may be: a box of the global frame. Anywhere that the radar sees unless stated.
+    #[serde(default, rename = "box")]
+    pub within_box: Option<BoxEntry>,
+    /// Distance from the surface at its nearest point, m.
+    #[serde(default)]
+    pub gap_m: f64,
+    /// Turn about the surface's normal: from and to, degrees. Its own y axis points upwards at 0.
+    #[serde(default = "any_turn")]
+    pub turn_deg: [f64; 2],
+    /// Most angle between the surface's normal and the way to the radar, degrees.
+    #[serde(default = "usual_tilt")]
+    pub most_tilt_deg: f64,
+}
+
+/// A material whose numbers are drawn from the covariance of its fit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Posterior {
+    /// The material, as the scene names it.
+    pub material: String,
+    /// The fit; the rendered one unless stated.
+    #[serde(default)]
+    pub fit: Option<String>,
+    /// Factor of the standard deviations.
+    #[serde(default = "unity")]
+    pub inflate: f64,
+}
+
+/// A physical effect of a part of the scans.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EffectDraw {
+    /// Its name, as `matdb effects` lists it.
+    pub name: String,
+    /// Share of the scans that have it, 0 to 1.
+    #[serde(default = "unity")]
+    pub share: f64,
+    /// Ends between which each parameter is drawn, from and to; those that are not named are absent.
+    #[serde(default)]
+    pub parameters: BTreeMap<String, [f64; 2]>,
+    /// `report.json` of a diagnosis that found it, beside this file: parameters are drawn from what it states.
+    #[serde(default)]
+    pub report: Option<String>,
+    /// The material that has it, where it is an effect of materials.
+    #[serde(default)]
+    pub material: Option<String>,
+}
+
+/// Most scans of a data set.
+const MOST_SCANS: u32 = 10_000_000;
+
+fn one() -> u32 {
+    1
+}
+
+fn usual_shard() -> u32 {
+    25
+}
+
+fn yes() -> bool {
+    true
+}
+
+fn unity() -> f64 {
+    1.0
+}
+
+fn usual_tilt() -> f64 {
+    45.0
+}
+
+fn any_turn() -> [f64; 2] {
+    [-180.0, 180.0]
+}
+
+impl Spec {
+    /// Reads and checks the text of a file at `path`.
+    ///
+    /// # Errors
+    /// What is no specification, by its place.
+    pub fn parse(text: &str, path: &Path) -> Result<Spec, Error> {
+        let spec: Spec = from_toml(text).map_err(|error| format_error(path, error))?;
+        spec.check().map_err(|(problem, way_out)| {
+            Error::usage(format!("{}: {problem}", path.display()), way_out)
+        })?;
+        Ok(spec)
+    }
+
+    /// The splits with their shares of the scans, in the order of their names; `train` alone where none is stated.
+    pub fn splits(&self) -> Vec<(&str, f64)> {
+        if self.split.is_empty() {
+            return vec![("train", 1.0)];
+        }
+        let all: f64 = self.split.values().sum();
+        self.split.iter().map(|(name, share)| (name.as_str(), share / all)).collect()
+    }
+
+    /// The problem of a specification that cannot be, and the way out.
+    fn check(&self) -> Result<(), (String, &'static str)> {
+        check_name("name", &self.name)?;
+        if !(1..=MOST_SCANS).contains(&self.scans) {
+            return Err((format!("scans = {}", self.scans), "give 1 to 10 000 000"));
+        }
+        if self.scans_per_shard == 0 || self.scans_per_shard > 10_000 {
+            let problem = format!("scans_per_shard = {}", self.scans_per_shard);
+            return Err((problem, "give 1 to 10 000; a shard is kept in memory until it is whole"));
+        }
+        if self.repeats == 0 || !self.scans.is_multiple_of(self.repeats) {
+            let problem = format!("repeats = {} of {} scans", self.repeats, self.scans);
+            return Err((problem, "give a number that divides the scans"));
+        }
+        self.check_splits()?;
+        self.check_choices()?;
+        for variation in &self.vary {
+            variation.check().map_err(|(problem, way_out)| {
+                (format!("[[vary]] of {}: {problem}", variation.keys.join(", ")), way_out)
+            })?;
+        }
+        self.place.iter().try_for_each(Placing::check)?;
+        for Posterior { material, inflate, .. } in &self.posterior {
+            if !(*inflate >= 0.0 && *inflate <= 100.0) {
+                let problem = format!("[[posterior]] of `{material}`: inflate = {inflate}");
+                return Err((problem, "give 0 to 100; 1 is the fit's own covariance"));
+            }
+        }
+        self.effect.iter().try_for_each(EffectDraw::check)
+    }
+
+    fn check_splits(&self) -> Result<(), (String, &'static str)> {
+        for (name, share) in &self.split {
+            check_name("split", name)?;
+            if !(*share > 0.0 && share.is_finite()) {
+                let problem = format!("split `{name}` has a share of {share}");
+                return Err((problem, "give shares above 0, such as 0.8 and 0.2"));
+            }
+        }
+        if self.split.len() > 1 && !self.choose.iter().any(|choice| choice.apart) {
+            let problem = "the splits leak: they all show the same persons and objects".to_owned();
+            return Err((
+                problem,
+                "give a [[choose]] whose options are kept apart with apart = true, or one split",
+            ));
+        }
+        Ok(())
+    }
+
+    fn check_choices(&self) -> Result<(), (String, &'static str)> {
+        let mut names = BTreeSet::new();
+        for choice in &self.choose {
+            let Choice { name, apart, option } = choice;
+            check_name("choose", name)?;
+            if !names.insert(name) {
+                return Err((format!("two [[choose]] are called `{name}`"), "rename one"));
+            }
+            if option.is_empty() {
+                let problem = format!("[[choose]] `{name}` has no option");
+                return Err((problem, "give one or more, as option = [{ name = …, set = { … } }]"));
+            }
+            let mut options: BTreeMap<&str, &ChoiceOption> = BTreeMap::new();
+            for one in option {
+                if options.insert(&one.name, one).is_some() {
+                    let problem = format!("[[choose]] `{name}` has two options `{}`", one.name);
+                    return Err((problem, "rename one"));
+                }
+                if let Some(split) = &one.split {
+                    let is_split = self.splits().iter().any(|(known, _)| known == split);
+                    if !apart || !is_split {
+                        let problem = format!(
+                            "option `{}` of [[choose]] `{name}` has split = \"{split}\"",
+                            one.name
+                        );
+                        return Err((problem, "name one of the splits, and set apart = true"));
+                    }
+                }
+            }
+            if *apart && option.len() < self.splits().len() {
+                let problem = format!(
+                    "the splits leak: [[choose]] `{name}` has {} options for {} splits",
+                    option.len(),
+                    self.splits().len()
+                );
+                return Err((problem, "give an option or more for each split, or fewer splits"));
+            }
+            let sets = option.iter().map(|one| format!("{:?}", one.set));
+            if *apart && sets.collect::<BTreeSet<_>>().len() < option.len() {
+                let problem =
+                    format!("the splits leak: two options of [[choose]] `{name}` set the same");
+                return Err((problem, "leave one out"));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Variation {
+    fn check(&self) -> Result<(), (String, &'static str)> {
+        const WAYS: &str = "give from and to, mean and sd, or values";
+        if self.keys.is_empty() {
+            return Err((
+                "has no keys".to_owned(),
+                "give keys = [\"radar.system_loss_db\"] or the like",
+            ));
+        }
+        match (&self.from, &self.to, &self.mean, &self.sd, &self.values[..]) {
+            (Some(from), Some(to), None, None, []) => {
+                let (from, to) = (from.list(), to.list());
+                let is_range = from.len() == to.len()
+                    && from.iter().chain(to).all(|end| end.is_finite())
+                    && from.iter().zip(to).all(|(from, to)| from <= to);
+                let problem = || {
+                    (
+                        format!("{from:?} to {to:?} is no range"),
+                        "give as many numbers in both, the smaller ones in from",
+                    )
+                };
+                is_range.then_some(()).ok_or_else(problem)
+            }
+            (None, None, Some(mean), Some(sd), []) => {
+                let (mean, sd) = (mean.list(), sd.list());
+                let is_law = mean.len() == sd.len()
+                    && mean.iter().chain(sd).all(|number| number.is_finite())
+                    && sd.iter().all(|sd| *sd >= 0.0);
+                let problem = || {
+                    (
+                        format!("mean {mean:?} and sd {sd:?} are no normal law"),
+                        "give as many numbers in both, sd 0 or more",
+                    )
+                };
+                is_law.then_some(()).ok_or_else(problem)
+            }
+            (None, None, None, None, [_, ..]) => Ok(()),
+            _ => Err(("says not one way to draw".to_owned(), WAYS)),
+        }
+    }
+}
+
+impl Numbers {
+    /// The numbers.
+    pub fn list(&self) -> &[f64] {
+        match self {
+            Numbers::One(number) => std::slice::from_ref(number),
+            Numbers::Several(numbers) => numbers,
+        }
+    }
+
+    /// The value of a key that has other numbers in the same form.
+    pub fn value_of(&self, numbers: &[f64]) -> Value {
+        match (self, numbers) {
+            (Numbers::One(_), [number, ..]) => Value::Float(*number),
+            _ => Value::Array(numbers.iter().copied().map(Value::Float).collect()),
+        }
+    }
+}
+
+impl Placing {
+    fn check(&self) -> Result<(), (String, &'static str)> {
+        let Placing { mesh, on, gap_m, turn_deg: [from, to], most_tilt_deg, .. } = self;
+        let at = |problem: String| format!("[[place]] of `{mesh}`: {problem}");
+        if mesh == on || self.under.contains(mesh) {
+            return Err((at(format!("on `{on}` or under itself")), "name other meshes"));
+        }
+        if !(0.0..=1.0).contains(gap_m) {
+            return Err((at(format!("gap_m = {gap_m}")), "give 0 to 1"));
+        }
+        if !(from <= to && from.is_finite() && to.is_finite()) {
+            return Err((at(format!("turn_deg = [{from}, {to}]")), "give the smaller one first"));
+        }
+        if !(*most_tilt_deg > 0.0 && *most_tilt_deg < 90.0) {
+            return Err((
+                at(format!("most_tilt_deg = {most_tilt_deg}")),
+                "give more than 0 and less than 90",
+            ));
+        }
+        Ok(())
+    }
+}
+
+impl EffectDraw {
+    fn check(&self) -> Result<(), (String, &'static str)> {
+        let at = |problem: String| format!("[[effect]] `{}`: {problem}", self.name);
+        if !(0.0..=1.0).contains(&self.share) {
+            return Err((at(format!("share = {}", self.share)), "give 0 to 1"));
+        }
+        if self.parameters.is_empty() == self.report.is_none() {
+            let problem = at("has parameters and a report, or neither".to_owned());
+            return Err((
+                problem,
+                "give parameters = { level_db = [-1, 1] } or the like, or the report of a diagnosis",
+            ));
+        }
+        for (name, [from, to]) in &self.parameters {
+            if !(from <= to && from.is_finite() && to.is_finite()) {
+                let problem = at(format!("{name} from {from} to {to} is no range"));
+                return Err((problem, "give the smaller one first"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The error of a file whose text cannot be taken.
+pub(super) fn format_error(path: &Path, error: FormatError) -> Error {
+    SceneError::Format { file: path.to_owned(), error }.into()
+}
+
+/// A name that becomes a part of names of files.
+fn check_name(key: &str, name: &str) -> Result<(), (String, &'static str)> {
+    let is_name = !name.is_empty()
+        && name.len() <= 64
+        && name.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-');
+    let problem = || {
+        (
+            format!("{key} = {name:?} is no name"),
+            "take small letters, digits and hyphens, 64 at most",
+        )
+    };
+    is_name.then_some(()).ok_or_else(problem)
+}
