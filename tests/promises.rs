@@ -16,6 +16,8 @@ mod closest_hits;
 mod closing_the_loop;
 mod completions;
 mod damaged_pages;
+#[cfg(feature = "parquet")]
+mod data_sets;
 mod database;
 mod diagnose_add;
 mod diagnose_command;

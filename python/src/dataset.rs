@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use matdb::dataset::{self, DatasetRun};
+use matdb::dataset::{Dataset as Planned, DatasetRun};
 use matdb::error::Error;
 use pyo3::prelude::*;
 
 use crate::database::Database;
-use crate::error::{UsageError, raised};
+use crate::error::{UsageError, raised, warn};
 use crate::interrupt::{Stop, interruptible};
 use crate::json::to_python;
 
@@ -24,7 +24,7 @@ pub(crate) struct Dataset {
 }
 
 impl Dataset {
-    fn of(planned: &dataset::Dataset) -> Dataset {
+    fn of(planned: &Planned) -> Dataset {
         let plan = planned.plan_of();
         Dataset {
             folder: planned.folder().to_owned(),
@@ -41,7 +41,7 @@ impl Dataset {
         progress: Option<&Py<PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let made = interruptible(py, |stop| -> Result<DatasetRun, Error> {
-            let planned = dataset::Dataset::open(&self.folder)?;
+            let planned = Planned::open(&self.folder)?;
             planned.run(part, &|now| hear(stop, progress, [now.done, now.of]))
         })?;
         to_python(py, &made.map_err(raised)?)
@@ -83,11 +83,11 @@ pub(crate) fn dataset(
     folder: Option<PathBuf>,
     db: Option<&Database>,
 ) -> PyResult<Dataset> {
-    let planned = interruptible(py, |_| -> Result<dataset::Dataset, Error> {
+    let planned = interruptible(py, |_| -> Result<Planned, Error> {
         let store = db.map_or(Ok(None), Database::read)?;
         match &folder {
-            Some(folder) => dataset::Dataset::plan(&what, folder, store.as_ref()),
-            None => dataset::Dataset::open(&what),
+            Some(folder) => Planned::plan(&what, folder, store.as_ref()),
+            None => Planned::open(&what),
         }
     })?;
     Ok(Dataset::of(&planned.map_err(raised)?))
@@ -117,7 +117,7 @@ impl Dataset {
     /// (`classes`), the splits, and the files that scans are made of.
     #[getter]
     fn plan<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let planned = py.detach(|| dataset::Dataset::open(&self.folder)).map_err(raised)?;
+        let planned = py.detach(|| Planned::open(&self.folder)).map_err(raised)?;
         to_python(py, planned.plan_of())
     }
 
@@ -195,9 +195,28 @@ impl Dataset {
     /// The shards that are missing or damaged, from 0.
     fn missing(&self, py: Python<'_>) -> PyResult<Vec<u32>> {
         let found = interruptible(py, |_| -> Result<_, Error> {
-            Ok(dataset::Dataset::open(&self.folder)?.missing())
+            Ok(Planned::open(&self.folder)?.missing())
         })?;
         found.map_err(raised)
+    }
+
+    /// Writes `croissant.json`, `README.md`, and the boxes in the form of COCO, for a data set that is complete.
+    ///
+    /// Returns
+    /// -------
+    /// list of str
+    ///     The files.
+    ///
+    /// Warns
+    /// -----
+    /// UserWarning
+    ///     A specification without a licence.
+    fn publish(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        let published =
+            interruptible(py, |_| -> Result<_, Error> { Planned::open(&self.folder)?.publish() })?;
+        let published = published.map_err(raised)?;
+        warn(py, &published.notices)?;
+        Ok(published.files)
     }
 
     /// Reads every file, and removes temporary ones that interrupted work has left.
@@ -208,7 +227,7 @@ impl Dataset {
     ///     `complete`, the numbers of `shards`, of those `done` and of their `scans`, and `problems`, a sentence each.
     fn check<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let found = interruptible(py, |_| -> Result<_, Error> {
-            Ok(dataset::Dataset::open(&self.folder)?.check())
+            Ok(Planned::open(&self.folder)?.check())
         })?;
         to_python(py, &found.map_err(raised)?)
     }

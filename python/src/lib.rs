@@ -10,6 +10,7 @@ mod command;
 mod compare;
 mod curve;
 mod database;
+mod dataset;
 mod diagnose;
 mod effect;
 mod error;
@@ -43,6 +44,8 @@ mod _matdb {
     use crate::curve::diagnose_curve;
     #[pymodule_export]
     use crate::database::{Database, open, verify};
+    #[pymodule_export]
+    use crate::dataset::{Dataset, dataset};
     #[pymodule_export]
     use crate::diagnose::{Diagnosis, diagnose, effects};
     #[pymodule_export]

@@ -7,7 +7,9 @@
 //! The order of the modules: what is drawn, where it is put, what is labelled, what is written.
 
 mod archive;
+mod card;
 mod check;
+mod croissant;
 mod draw;
 mod effect;
 mod images;
@@ -17,6 +19,7 @@ mod place;
 mod plan;
 mod points;
 mod posterior;
+mod publish;
 mod recipe;
 mod run;
 mod scan;
@@ -28,5 +31,6 @@ mod table;
 pub use check::DatasetCheck;
 pub use labels::Classes;
 pub use plan::{Dataset, Input, Plan, PlannedSplit};
+pub use publish::DatasetPublication;
 pub use run::{DatasetProgress, DatasetRun};
 pub use spec::{Choice, ChoiceOption, EffectDraw, Numbers, Placing, Posterior, Spec, Variation};

@@ -37,6 +37,11 @@ impl Row<'_> {
     }
 }
 
+/// A power in dBm; NaN for none.
+fn dbm(power_w: f64) -> f64 {
+    if power_w > 0.0 { dbm_from_watts(power_w) } else { f64::NAN }
+}
+
 /// How a column is filled.
 enum Fill {
     Int(Kind, fn(&Row, &Labels) -> i32),
@@ -104,13 +109,13 @@ const COLUMNS: [Entry; 32] = [
         "power_dbm",
         "dB[mW]",
         "measured power",
-        Fill::Float(|row| row.of_echo(|echo| dbm_from_watts(echo.power_w))),
+        Fill::Float(|row| row.of_echo(|echo| dbm(echo.power_w))),
     ),
     (
         "mean_power_dbm",
         "dB[mW]",
         "mean power of what caused the return, over speckle and noise",
-        Fill::Float(|row| row.of_truth(|truth| dbm_from_watts(truth.mean_power_w))),
+        Fill::Float(|row| row.of_truth(|truth| dbm(truth.mean_power_w))),
     ),
     (
         "true_range_m",

@@ -2,6 +2,7 @@
 
 mod check;
 mod plan;
+mod publish;
 mod run;
 
 use std::path::PathBuf;
@@ -18,7 +19,8 @@ use crate::setup::Database;
   matdb dataset run concealed.toml -o ds      plan it, make what is missing, and say when it will be done
   matdb dataset plan concealed.toml -o ds     only plan it: files, time and bytes that it will take
   matdb dataset shard ds 3/64                 the fourth of 64 parts, on a machine of its own
-  matdb dataset check ds                      whether all of it is there and sound")]
+  matdb dataset check ds                      whether all of it is there and sound
+  matdb dataset publish ds                    describe it for others")]
 pub(super) struct Args {
     #[command(subcommand)]
     command: Command,
@@ -30,6 +32,7 @@ enum Command {
     Run(run::RunArgs),
     Shard(run::ShardArgs),
     Check(check::Args),
+    Publish(publish::Args),
 }
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
@@ -38,6 +41,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         Command::Run(args) => run::run(args, db, console),
         Command::Shard(args) => run::shard(args, console),
         Command::Check(args) => check::run(args, console),
+        Command::Publish(args) => publish::run(args, console),
     }
 }
 
