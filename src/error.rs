@@ -30,6 +30,14 @@ pub enum Error {
     /// A scene cannot be loaded.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// A scene cannot be loaded with changes that were asked for, and can without.
+    #[error("{changes}: {error}")]
+    Change {
+        /// The change at fault, or all of them.
+        changes: String,
+        /// What is wrong.
+        error: Box<Error>,
+    },
     /// A radar cannot exist.
     #[error(transparent)]
     Radar(#[from] RadarError),

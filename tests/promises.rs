@@ -10,6 +10,7 @@ mod book;
 mod builtin_catalogue;
 mod calibrate_command;
 mod chain;
+mod changed_keys;
 mod check_command;
 mod closed_forms;
 mod closest_hits;

@@ -8,7 +8,8 @@ use matdb::effects::EffectList;
 use matdb::files::{folder_of, write_all};
 use matdb::formats::ply::write_mesh;
 use matdb::geometry::Mesh;
-use matdb::scene::{self, GivenMaterials, GivenMeshes, SceneFile, read_text};
+use matdb::scene::change::apply;
+use matdb::scene::{self, GivenMaterials, GivenMeshes, KeyChange, SceneFile, read_text};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -276,6 +277,28 @@ impl Scene {
     #[pyo3(signature = (**changes))]
     fn replace(&self, py: Python<'_>, changes: Option<&Bound<'_, PyDict>>) -> PyResult<Scene> {
         self.with(py, changes.unwrap_or(&PyDict::new(py)))
+    }
+
+    /// This scene with other values of keys, as `matdb render --set` has them: `{"mesh.body.rotation_deg": [0, 20, 0]}`. A table
+    /// in a list has its name there; an effect that is not there is added.
+    ///
+    /// Parameters
+    /// ----------
+    /// changes : dict of str to value
+    ///
+    /// Raises
+    /// ------
+    /// matdb.SceneError
+    ///     A mesh, region or receiver that is not there, and what a file would be refused for.
+    fn with_changes(&self, py: Python<'_>, changes: &Bound<'_, PyAny>) -> PyResult<Scene> {
+        let (mut table, mut own) = (self.table()?, self.scene.given.clone());
+        let at = |error| raised(scene::SceneError::Format { file: self.path.clone(), error });
+        for (key, value) in &dict_of(changes)? {
+            let key: String = key.extract()?;
+            let change = KeyChange::new(&key, toml_value(&key, &value, &mut own)?).map_err(at)?;
+            apply(&mut table, &[change]).map_err(at)?;
+        }
+        self.with_text(py, table.to_string(), own)
     }
 
     /// This scene with other materials of its regions, by their names. Meshes are not loaded again.

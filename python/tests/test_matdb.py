@@ -104,6 +104,12 @@ def test_errors_are_the_sentences_of_the_command_line(scene, tmp_path):
         scene.replace(name__of="x")
     with pytest.raises(TypeError, match="no such value"):
         scene.replace(seed=None)
+    with pytest.raises(md.SceneError, match="did you mean `plate`"):
+        scene.with_changes({"mesh.plat.scale": 2})
+    changes = {"seed": 9, "mesh.plate.rotation_deg": np.array([0, 4, 0]), "radar.effect.drift.slope_db": 8}
+    changed = scene.with_changes(changes).to_dict()
+    assert (changed["seed"], changed["mesh"][0]["rotation_deg"]) == (9, [0, 4, 0])
+    assert changed["radar"]["effect"] == [{"name": "drift", "slope_db": 8}]
     with pytest.raises(md.MaterialError, match="nothing-such"):
         md.render(md.Scene.from_text(SCENE.replace("mannequin-paint", "nothing-such"), "plate.toml"))
     Path("foreign.sqlite").write_text("This is another program's file.")

@@ -14,6 +14,7 @@ pub fn message(error: &Error) -> String {
         Error::Exchange(ExchangeError::Missing { file, missing }) => {
             format!("{file} does not say all that an entry needs; add {}", flags(missing))
         }
+        Error::Change { changes, error } => format!("--set {changes}: {}", message(error)),
         Error::Missing { what, missing } => format!("{what} needs more; add {}", flags(missing)),
         Error::Detail { detail, problem, way_out } => {
             format!("--{} {problem}; {way_out}", detail.noun())

@@ -1,7 +1,7 @@
 //! What the radar looks at: meshes, where they stand, and which facets are made of what.
 
 pub mod builtin;
-mod change;
+pub mod change;
 mod error;
 pub mod file;
 mod load;

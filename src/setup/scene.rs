@@ -13,7 +13,7 @@ use crate::geometry::Raster;
 use crate::material::{Curve, Lobes, Material};
 use crate::radar::{Beam, Channel, Radar, SpeckleForm};
 use crate::render::{Bounce, RenderError, Scan, Setup, Sheet, SheetGain, Surface, power_image};
-use crate::scene::{Region, Scene};
+use crate::scene::{KeyChange, Region, Scene, SceneError, SceneFile, read_text};
 use crate::store::Store;
 use crate::trace::{Bvh, ScanGeometry};
 use crate::units::{range, ratio_from_db, rounded, shown};
@@ -91,6 +91,36 @@ impl ReadyScene {
     /// A scene, material or effect that cannot be loaded, by its file and place.
     pub fn open(path: &Path, store: Option<&Store>) -> Result<ReadyScene, Error> {
         ReadyScene::new(Scene::load(path)?, path, store)
+    }
+
+    /// As [`open`](Self::open), with keys of the scene file changed.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open); a change is named if the scene can be loaded without it.
+    pub fn open_changed(
+        path: &Path,
+        changes: &[KeyChange],
+        store: Option<&Store>,
+    ) -> Result<ReadyScene, Error> {
+        let text = read_text(path)?;
+        let open = |changes: &[KeyChange]| -> Result<ReadyScene, Error> {
+            let at = |error| SceneError::Format { file: path.to_owned(), error };
+            let file = SceneFile::parse_changed(&text, changes).map_err(at)?;
+            ReadyScene::new(Scene::resolve(file, path)?, path, store)
+        };
+        open(changes).map_err(|error| {
+            if changes.is_empty() || open(&[]).is_err() {
+                return error;
+            }
+            let mut faults = changes.to_vec();
+            for place in 0..changes.len() {
+                if open(&[&changes[..place], &changes[place + 1..]].concat()).is_ok() {
+                    faults = vec![changes[place].clone()];
+                }
+            }
+            let faults: Vec<String> = faults.iter().map(KeyChange::to_string).collect();
+            Error::Change { changes: faults.join(", "), error: Box::new(error) }
+        })
     }
 
     /// As [`open`](Self::open), of a scene that was loaded from `path` and may have been changed since.

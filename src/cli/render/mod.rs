@@ -13,6 +13,7 @@ use crate::files::write_all;
 use crate::formats::exr::Packing;
 use crate::render::RenderError;
 use crate::report::{BeatShape, RenderRequest};
+use crate::scene::KeyChange;
 use crate::setup::{Database, ReadyScene};
 use crate::trace::Tracer;
 use stages::Stages;
@@ -23,6 +24,8 @@ use tracer::{Rays, gpu};
 #[command(after_help = "Examples:
   matdb render scenes/mannequin.toml -o out
   matdb render scenes/mannequin.toml -o out --all --json
+  matdb render scenes/mannequin.toml -o out --seed 3 --set radar.speckle.looks=4
+  matdb render scenes/mannequin.toml -o out --set 'mesh.mannequin.rotation_deg=[0, 20, 0]'
   matdb render scenes/showcase.toml -o out    spot, speckle, noise, receivers, second bounce")]
 pub(super) struct Args {
     /// The scene file
@@ -30,6 +33,13 @@ pub(super) struct Args {
     /// Folder to write; created if needed
     #[arg(long, short, value_name = "DIR")]
     output: PathBuf,
+    /// Seed of everything random in place of the scene's: --set seed=N
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(i64).range(0..))]
+    seed: Option<i64>,
+    /// Change a key of the scene file for this run; repeatable. Tables in lists have names, as in
+    /// mesh.NAME.scale=2; VALUE is TOML or a word without quotes
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    changes: Vec<KeyChange>,
     /// Put every hit into cloud.ply, not only those above the threshold
     #[arg(long)]
     all: bool,
@@ -56,7 +66,9 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let stages = Stages::start("load", console);
-    let ready = ReadyScene::open(&args.scene, db.read()?.as_ref())?;
+    let seed = args.seed.map(|seed| KeyChange::new("seed", seed)).transpose()?;
+    let changes: Vec<KeyChange> = seed.into_iter().chain(args.changes.iter().cloned()).collect();
+    let ready = ReadyScene::open_changed(&args.scene, &changes, db.read()?.as_ref())?;
     let beat = args.beat.then(|| BeatShape::new(&ready.scene)).transpose();
     let beat = beat.map_err(|error| or_else(error, "leave --beat out"))?;
     let gpu = gpu(args.tracer, console);
