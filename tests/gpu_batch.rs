@@ -207,6 +207,20 @@ fn every_scene_in_every_pose() {
     }
 }
 
+/// The device does not know the loss: the processor computes the echoes.
+#[test]
+fn air_with_a_loss_is_the_renderer_s() {
+    let Some(gpu) = adapter(u64::MAX) else { return };
+    let mut bench = Bench::of("mannequin.toml", 701);
+    bench.radar.air_loss_db_per_m = 0.5;
+    let surfaces = surfaces(&bench.laws);
+    let take = |target| Take { target, surfaces: &surfaces, seed: 0, noise_seed: None };
+    for rays in [1, 40] {
+        let found = bench.compared(&gpu, &poses().map(take), rays);
+        assert_eq!(found.rays_on_processor, found.rays);
+    }
+}
+
 #[test]
 fn every_spot_is_averaged() {
     let Some(gpu) = adapter(u64::MAX) else { return };

@@ -91,11 +91,12 @@ fn pchip(x: &[f64], y: &[f64], at: f64) -> f64 {
         + t * t * t * (2.0 * (y[i] - y[i + 1]) + m0 + m1)
 }
 
-fn check(scene_name: &str) {
+fn check(scene_name: &str, changes: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
     matdb(folder.path())
         .args(["render", "-q", "-o", "out"])
         .arg(scene(scene_name))
+        .args(changes)
         .assert()
         .success();
     let record: Value =
@@ -104,6 +105,9 @@ fn check(scene_name: &str) {
     let cloud = read_cloud(&folder.path().join("out/cloud.ply"));
     let radar = &record["radar"];
     assert_eq!(radar["footprint"], "paper");
+    let air_db_per_m = radar.get("air_loss_db_per_m").map_or(0.0, |loss| loss.as_f64().unwrap());
+    let equation = record["equation"].as_str().unwrap();
+    assert_eq!(equation.contains("air_loss_db_per_m"), air_db_per_m > 0.0);
     let origin = list(&record["frames"]["origin_global_m"]);
     // The scenes' radar looks along −z from the middle of its target plane, so that x_t and y_t, carried out to
     // 8 m, are where the axis passes there.
@@ -141,6 +145,7 @@ fn check(scene_name: &str) {
         let passed_db = cloud.get("passed_db").map_or(0.0, |passed| passed[i]);
         let expected = passed_db + number(radar, "transmit_power_dbm")
             - number(radar, "system_loss_db")
+            - air_db_per_m * 2.0 * range_m
             + 10.0 * solid_angle_sr(w0, range_m).log10()
             + 10.0 * f_per_sr(&material["scattering"], theta, delta).log10()
             + 20.0 * theta.cos().log10();
@@ -160,10 +165,16 @@ fn check(scene_name: &str) {
 
 #[test]
 fn every_point_of_the_mannequin() {
-    check("mannequin.toml");
+    check("mannequin.toml", &[]);
 }
 
 #[test]
 fn every_point_of_the_human() {
-    check("human.toml");
+    check("human.toml", &[]);
+}
+
+#[test]
+fn every_point_through_air_with_a_loss() {
+    let changes = ["--set", "radar.air_loss_db_per_m=0.4", "--set", "radar.threshold_dbm=-84"];
+    check("mannequin.toml", &changes);
 }

@@ -3,6 +3,7 @@
 //!
 //! Apart from it stands `store_all_or_nothing/`, which puts hooks on every connection of its process to the database.
 
+mod air;
 mod any_pose;
 mod bad_input;
 mod bare_program;

@@ -171,7 +171,18 @@ fn agrees(bench: &Bench, effects: &SceneEffects, case: &str) -> usize {
 
 #[test]
 fn every_effect_changes_every_echo_as_its_model_predicts() {
-    let mut bench = Bench::new(SCENE);
+    for text in [SCENE.to_owned(), with_air()] {
+        every_effect_agrees(&text);
+    }
+}
+
+/// The scene in air with a loss.
+fn with_air() -> String {
+    SCENE.replace("[radar.scan]", "[radar]\nair_loss_db_per_m = 0.4\n[radar.scan]")
+}
+
+fn every_effect_agrees(text: &str) {
+    let mut bench = Bench::new(text);
     // Only a rough surface shadows itself.
     assert!(bench.laws[0].set_parameter("specular.m", 0.8));
     let bare = bench.bare();
@@ -201,8 +212,10 @@ fn every_effect_changes_every_echo_as_its_model_predicts() {
 /// f(i, o), the field that facets turn, the way back past the target, and half of the whole way as the range.
 #[test]
 fn an_antenna_apart_receives_what_the_model_predicts() {
-    let mut bench = Bench::new(SCENE);
-    for (x_m, aperture_m2) in [(-3.0, None), (6.0, Some(0.02))] {
+    for (text, x_m, aperture_m2) in
+        [(SCENE, -3.0, None), (SCENE, 6.0, Some(0.02)), (&with_air(), 6.0, None)]
+    {
+        let mut bench = Bench::new(text);
         bench.antenna = Some(Antenna { position: Point::new(x_m, 1.4, 4.0), aperture_m2 });
         for effect in library() {
             let conflicts = effect.about().conflicts;

@@ -539,7 +539,8 @@ impl Model<'_> {
             f_per_sr = effect.scatter(values, stage, law, shot, f_per_sr);
         }
         if let Some(way) = way_back {
-            return stage.link.flux_w(shot.hit.cos_theta) * f_per_sr * way.projected_sr;
+            let flux_w = stage.link.flux_w(shot.hit.cos_theta);
+            return flux_w * f_per_sr * way.projected_sr * stage.link.air_share(2.0 * way.range_m);
         }
         let beam = stage.beam(shot);
         let power_w = stage.link.power_w(&beam, shot.hit.range_m, shot.hit.cos_theta, f_per_sr);

@@ -161,6 +161,42 @@ fn at_absent_values_no_effect_changes_anything() {
     }
 }
 
+/// The loss of a bundle of paths is, to first order, that of their mean range.
+#[test]
+fn air_takes_its_loss_of_every_echo_by_its_range() {
+    const LOSS_DB_PER_M: f64 = 1e-4;
+    // A layer on the target makes its echo seem some millimetres of 8 m longer; the air does not see that.
+    const SHARE: f64 = 2e-3;
+    for bench in benches() {
+        let air_loss_db_per_m = LOSS_DB_PER_M;
+        let radar = Radar { air_loss_db_per_m, ..bench.radar.clone() };
+        let through = Bench { radar, regions: bench.regions.clone(), ..bench };
+        let bench = Bench {
+            radar: Radar { air_loss_db_per_m: 0.0, ..through.radar.clone() },
+            bvh: Bvh::new(through.bvh.mesh()),
+            chirps: through.chirps.clone(),
+            regions: through.regions.clone(),
+            law: through.law.clone(),
+            shots: through.shots.clone(),
+        };
+        for effect in library() {
+            let values = effect.starts(&bench.stage(), &bench.shots).swap_remove(0);
+            let (bare, lossy) = (bench.with(effect, &values), through.with(effect, &values));
+            assert!(bare.len() == lossy.len() && !bare.is_empty(), "{}", effect.name());
+            for (bare, lossy) in std::iter::zip(bare, lossy).filter(|(bare, _)| bare.power_w > 0.0)
+            {
+                let (expected_db, found_db) =
+                    (-LOSS_DB_PER_M * 2.0 * bare.range_m, db(lossy.power_w / bare.power_w));
+                assert!(
+                    (found_db / expected_db - 1.0).abs() < SHARE,
+                    "{}: {found_db}",
+                    effect.name()
+                );
+            }
+        }
+    }
+}
+
 fn is_sound(prediction: &Prediction) -> bool {
     let arrived = prediction.arrived.iter().flatten().all(|arrived| {
         let MeanEcho { power_w, range_m, .. } = *arrived;

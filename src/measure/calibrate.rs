@@ -143,7 +143,7 @@ impl Calibration {
         let aperture =
             link.solid_angle_sr(&strongest.beam, strongest.range_m) / section.solid_angle_sr();
         let lossless_dbm = radar.transmit_power_dbm + db_from_ratio(reflectance * aperture);
-        let fit = Fit { view, shots: &shots, lossless_dbm, within_db };
+        let fit = Fit { view, shots: &shots, link, lossless_dbm, within_db };
         let fitted = fit.run(&strongest)?;
         fit.check(&fitted, beams, chirps, cloud)?;
         let result = fit.result(&fitted, &strongest, 2.0 * radar.spot_fwhm_m());
@@ -295,6 +295,7 @@ fn aside(ray: &Ray<Global>, point: DVec3) -> DVec3 {
 struct Fit<'a> {
     view: View,
     shots: &'a [Shot],
+    link: Link,
     /// Power that would return without loss and diffraction, dBm.
     lossless_dbm: f64,
     within_db: f64,
@@ -310,7 +311,8 @@ impl Fit<'_> {
     /// Model power of a shot, dBm.
     fn model_dbm(&self, shot: &Shot, unknowns: &Unknowns) -> f64 {
         let Shot { ray, range_m, beam, .. } = shot;
-        self.lossless_dbm - unknowns[0] + self.view.return_db(ray, *range_m, *beam, unknowns)
+        let return_db = self.view.return_db(ray, *range_m, *beam, unknowns);
+        self.lossless_dbm - unknowns[0] + return_db - self.link.air_loss_db(2.0 * range_m)
     }
 
     /// Chooses points and fits by turns, from the strongest point on.
@@ -627,9 +629,10 @@ mod tests {
                 }
             };
             let point = ray.origin.xyz + range_m * ray.direction.xyz();
-            let power_dbm = radar.transmit_power_dbm - LOSS_DB
-                + db_from_ratio(REFLECTANCE * share)
-                + error_db(number, point);
+            let power_dbm =
+                radar.transmit_power_dbm - LOSS_DB - radar.air_loss_db_per_m * 2.0 * range_m
+                    + db_from_ratio(REFLECTANCE * share)
+                    + error_db(number, point);
             if power_dbm >= radar.threshold_dbm {
                 points.push(CloudPoint {
                     chirp: Some(chirps.number[number]),
@@ -657,8 +660,11 @@ mod tests {
 
     #[test]
     fn without_errors_loss_and_beam_are_found_as_they_are() {
-        for (given, true_shape) in targets() {
-            let radar = radar(&given);
+        let [plate, sphere, corner] = targets();
+        for ((given, true_shape), air_loss_db_per_m) in
+            [(plate, 0.0), (sphere, 0.0), (corner, 0.0), (plate, 0.5), (sphere, 0.5)]
+        {
+            let radar = Radar { air_loss_db_per_m, ..radar(&given) };
             let chirps = chirps(&radar);
             let cloud = measured(&true_shape, &radar, &chirps, |_, _| 0.0);
             let found = run(&given, &radar, &chirps, &cloud).unwrap();

@@ -90,6 +90,7 @@ struct Reducer<'a> {
 pub fn sigma0(link: &Link, axis: &Ray<Global>, range_m: f64, cos_theta: f64, power_w: f64) -> f64 {
     let solid_angle_sr = link.solid_angle_sr(&link.beam.along(axis), range_m);
     let received_w = link.transmit_power_w * link.system_gain_ratio * solid_angle_sr;
+    let received_w = received_w * link.air_share(2.0 * range_m);
     let quotient = power_w * 4.0 * PI / received_w;
     quotient * Footprint::Paper.factor_to(link.footprint, cos_theta)
 }
@@ -583,8 +584,10 @@ mod tests {
 
     #[test]
     fn both_footprints_give_back_f() {
-        for footprint in [Footprint::Paper, Footprint::Projected] {
-            let radar = Radar { footprint, ..Default::default() };
+        for (footprint, air_loss_db_per_m) in
+            [(Footprint::Paper, 0.0), (Footprint::Projected, 0.0), (Footprint::Paper, 0.7)]
+        {
+            let radar = Radar { footprint, air_loss_db_per_m, ..Default::default() };
             let (link, origin) = (Link::new(&radar), radar.frames().origin());
             let direction = origin.towards(Point::new(0.1, 1.0, 0.0)).unwrap();
             let axis = Ray { origin, direction };

@@ -22,6 +22,7 @@ impl Radar {
             ("transmit_power_dbm", self.transmit_power_dbm, (-100.0, 100.0)),
             ("aperture_m2", self.aperture_m2.unwrap_or(1.0), (1e-9, 1e6)),
             ("system_loss_db", self.system_loss_db, (-200.0, 200.0)),
+            ("air_loss_db_per_m", self.air_loss_db_per_m, (0.0, 100.0)),
             ("threshold_dbm", self.threshold_dbm, (-300.0, 100.0)),
             ("spot_diameter_m", self.spot_diameter_m, (1e-5, 10.0)),
             ("reflector_centre_m[0]", x_c, far_m),
@@ -120,6 +121,12 @@ mod tests {
         assert!(radar.validate().is_err());
         let radar = Radar { aperture_m2: Some(0.0), ..Default::default() };
         assert!(radar.validate().unwrap_err().to_string().contains("aperture_m2 = 0"));
+        for (air_loss_db_per_m, is_valid) in
+            [(0.0, true), (100.0, true), (-0.001, false), (100.1, false), (f64::NAN, false)]
+        {
+            let radar = Radar { air_loss_db_per_m, ..Default::default() };
+            assert_eq!(radar.validate().is_ok(), is_valid, "{air_loss_db_per_m}");
+        }
         let radar = Radar { preset: "upm".into(), ..Default::default() };
         assert!(radar.validate().unwrap_err().to_string().contains("upm-300ghz"));
     }

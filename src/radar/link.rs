@@ -18,6 +18,8 @@ pub struct Link {
     pub aperture_m2: Option<f64>,
     /// Two-way losses and calibration as a power ratio, 1 for none, smaller for a loss.
     pub system_gain_ratio: f64,
+    /// Loss of the air, dB per metre of a path.
+    pub air_loss_db_per_m: f64,
     /// How a tilted surface spreads the spot.
     pub footprint: Footprint,
     /// The antenna's beams.
@@ -55,6 +57,7 @@ impl Link {
             transmit_power_w: watts_from_dbm(radar.transmit_power_dbm),
             aperture_m2: radar.aperture_m2,
             system_gain_ratio: ratio_from_db(-radar.system_loss_db),
+            air_loss_db_per_m: radar.air_loss_db_per_m,
             footprint: radar.footprint,
             beam: Beam::new(radar),
         }
@@ -81,13 +84,26 @@ impl Link {
         }
     }
 
-    /// Equation (11): power, W, that the radar receives from a surface in a beam, from the range (m), the
-    /// cosine of incidence and f (1/sr).
-    pub fn power_w(&self, beam: &GaussianBeam, range_m: f64, cos_theta: f64, f_per_sr: f64) -> f64 {
-        self.flux_w(cos_theta) * f_per_sr * cos_theta * self.solid_angle_sr(beam, range_m)
+    /// Loss of the air on a path, dB, from its whole length, m, there and back.
+    pub fn air_loss_db(&self, path_m: f64) -> f64 {
+        self.air_loss_db_per_m * path_m
     }
 
-    /// Power that a surface under the spot is taken to receive, W, losses included.
+    /// Share of the power that the air lets through on a path, from its whole length, m, there and back. 1 exactly where
+    /// the air has no loss.
+    pub fn air_share(&self, path_m: f64) -> f64 {
+        if self.air_loss_db_per_m == 0.0 { 1.0 } else { ratio_from_db(-self.air_loss_db(path_m)) }
+    }
+
+    /// Equation (11): power, W, that the radar receives from a surface in a beam, from the range (m), the
+    /// cosine of incidence and f (1/sr), with the loss of the air.
+    pub fn power_w(&self, beam: &GaussianBeam, range_m: f64, cos_theta: f64, f_per_sr: f64) -> f64 {
+        let bare_w = self.flux_w(cos_theta) * f_per_sr * cos_theta;
+        bare_w * self.solid_angle_sr(beam, range_m) * self.air_share(2.0 * range_m)
+    }
+
+    /// Power that a surface under the spot is taken to receive, W, losses included except that of the air, which
+    /// depends on the whole path.
     pub fn flux_w(&self, cos_incidence: f64) -> f64 {
         let spread = match self.footprint {
             Footprint::Paper => cos_incidence,
@@ -131,6 +147,18 @@ mod tests {
         let projected = Link { footprint: Footprint::Projected, ..link };
         let ratio = projected.power_w(&beam, 8.0, 0.25, 0.5) / link.power_w(&beam, 8.0, 0.25, 0.5);
         assert!((ratio - 4.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn air_takes_its_loss_on_the_whole_path_and_nothing_without_one() {
+        let (link, beam) = link(None);
+        assert_eq!(link.air_share(1e4), 1.0);
+        let through = Link { air_loss_db_per_m: 0.25, ..link };
+        for range_m in [6.0, 8.0] {
+            let ratio =
+                through.power_w(&beam, range_m, 0.5, 1.0) / link.power_w(&beam, range_m, 0.5, 1.0);
+            assert!((db_from_ratio(ratio) + 0.5 * range_m).abs() < 1e-12);
+        }
     }
 
     #[test]

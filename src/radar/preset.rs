@@ -18,6 +18,7 @@ impl Default for Radar {
             transmit_power_dbm: 7.0,
             aperture_m2: None,
             system_loss_db: 12.5,
+            air_loss_db_per_m: 0.0,
             calibrated: false,
             threshold_dbm: -77.0,
             returns: Returns::default(),

@@ -44,6 +44,9 @@ pub struct Radar {
     /// Two-way losses and calibration, dB. 12.5: assumed, so that a painted mannequin's specular peak
     /// lands where the paper's figure 9 has it.
     pub system_loss_db: f64,
+    /// Loss of the air, dB per metre of a path, there and back. 0: none.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub air_loss_db_per_m: f64,
     /// Whether `system_loss_db` was measured, so that a diagnosis takes the level of the radar as it is. false: a
     /// diagnosis finds how far the level is off.
     #[serde(skip_serializing_if = "is_off")]
@@ -134,6 +137,10 @@ pub enum Returns {
 /// What serde leaves out.
 fn is_off(on: &bool) -> bool {
     !*on
+}
+
+fn is_zero(number: &f64) -> bool {
+    *number == 0.0
 }
 
 impl Returns {

@@ -4,7 +4,7 @@
 //! of whole chirps, evaluates equation (11) for each and sums over the spot, equation (7), for many scans at
 //! a time. The CPU computes in f64 the rays that the device leaves open: rays near an edge, and rays on scattering
 //! models that are not a sum of [`Term`](crate::brdf::Term)s. Where a spot reaches beyond the smooth piece that returns a wave, whose
-//! amplitudes add up, it computes the whole spot. With any other tracer it computes all rays. Poses, spots and the receiver are
+//! amplitudes add up, it computes the whole spot. With any other tracer, or a loss of the air, it computes all rays. Poses, spots and the receiver are
 //! always computed on the CPU, in f64.
 //!
 //! Speckle is that of the law, and of the same field as in a scan of its own.
@@ -201,7 +201,10 @@ impl<'a> Work<'a> {
         if rays > 1 && surfaces.any(|surface| surface.has_wave(beam_rad)) {
             work.pieces = smooth_pieces(bvh.mesh(), region_of_facet);
         }
-        if let Tracer::Gpu(held) = batch.geometry.tracer {
+        // The device does not know the air: it then finds the hits, and the CPU computes the echoes.
+        if let Tracer::Gpu(held) = batch.geometry.tracer
+            && work.link.air_loss_db_per_m == 0.0
+        {
             if !std::ptr::eq(held.bvh(), batch.geometry.bvh) {
                 return Err(gpu_error(GpuError::OtherMesh));
             }
@@ -538,6 +541,10 @@ mod tests {
             shadowing: Shadowing::Correlated,
         });
         check_against_the_renderer(&brushed(), &radar(None), 1);
+        let through_air = Radar { air_loss_db_per_m: 0.5, ..radar(None) };
+        for rays in [1, 40] {
+            check_against_the_renderer(&polished, &through_air, rays);
+        }
         for rays in [1, 40] {
             check_against_the_renderer(&polished, &radar(four_looks), rays);
             check_against_the_renderer(&Lambert { albedo: 0.5 }, &radar(four_looks), rays);

@@ -412,12 +412,16 @@ impl<'a> Reception<'a> {
         let polarised = self.polarised_share(scattered.specular_share, &[place], view, &ways);
         let share =
             if outward.is_some() { view.received_share(scattered) * polarised.share } else { 0.0 };
+        let path_m = place.hit.range_m + view.antenna_m;
+        let air_share = self.paths.link.air_share(path_m);
         let [x, y, _] = place.source.xyz().to_array();
         let apparent_m = 0.5 * delay_m(&ways) + self.echo_behind_m(place, view, scattered);
         let hit = place.hit;
         Path {
-            range_m: 0.5 * (hit.range_m + view.antenna_m) + apparent_m,
-            power_w: self.paths.link.flux_w(hit.cos_theta) / self.chirp.rays as f64 * share,
+            range_m: 0.5 * path_m + apparent_m,
+            power_w: self.paths.link.flux_w(hit.cos_theta) / self.chirp.rays as f64
+                * share
+                * air_share,
             hit,
             sheets: inward.sheets,
             passed_share: polarised.passed,
@@ -468,10 +472,11 @@ impl<'a> Reception<'a> {
         let enhancement = self.enhancement(coherent_share);
         let delay_m = delay_m(&ways);
         let [a, b] = [&point.place, place].map(|place| self.piece(&place.hit));
-        let path_m = point.place.hit.range_m + place.hit.range_m + view.antenna_m + delay_m;
+        let path_m = point.place.hit.range_m + place.hit.range_m + view.antenna_m;
+        let air_share = self.paths.link.air_share(path_m);
         Some(Path {
-            range_m: 0.5 * path_m,
-            power_w: power_w * polarised.share * enhancement,
+            range_m: 0.5 * (path_m + delay_m),
+            power_w: power_w * polarised.share * enhancement * air_share,
             passed_share: polarised.passed,
             delay_m: 0.5 * delay_m,
             pieces: [a.min(b), a.max(b)],

@@ -177,7 +177,8 @@ fn detour(
     let way_m = shot.hit.point.distance_m(second.hit.point) + back_m;
     let sent_sr = density_per_sr
         .map_or(1.0, |density_per_sr| o.cos_theta() / density_per_sr / (KINDS * DIRECTIONS) as f64);
-    let sent_w = stage.link.flux_w(shot.hit.cos_theta) * sent_sr;
+    let path_m = shot.hit.range_m + way_m;
+    let sent_w = stage.link.flux_w(shot.hit.cos_theta) * sent_sr * stage.link.air_share(path_m);
     let along_beam_m = (second.hit.point.xyz - radar.xyz).dot(shot.ray.direction.xyz());
     let solid_angle_sr = stage.link.solid_angle_sr(&beam, along_beam_m);
     Some(Detour {
@@ -189,7 +190,7 @@ fn detour(
         pattern: pattern.max(outside_spot),
         beside_m: (second.hit.point.xyz - radar.xyz).reject_from(shot.ray.direction.xyz()).length(),
         beam_rad: beam.divergence_rad(),
-        range_m: (shot.hit.range_m + way_m) / 2.0,
+        range_m: path_m / 2.0,
     })
 }
 

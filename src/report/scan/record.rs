@@ -33,13 +33,17 @@ const EQUATION: &str = "power_w = transmit_power_w * 10^(-system_loss_db/10) * s
     mean of this over the rays of the spot, and range and incidence are no longer those of one ray; docs/model.md has receivers elsewhere, \
     second surfaces, speckle and noise";
 
+/// What the equation has in addition where the air has a loss.
+const AIR: &str = "; power_w has the factor 10^(-air_loss_db_per_m * path_m / 10), too, path_m = 2 * range_m, or the whole \
+    length from the radar by way of all surfaces to the antenna";
+
 /// A rendering, as `scan.json` holds it.
 #[derive(Serialize)]
 pub struct ScanRecord<'a> {
     schema: u32,
     program: &'static str,
     version: &'static str,
-    equation: &'static str,
+    equation: String,
     scene: Value,
     pub(super) radar: &'a Radar,
     /// The beam towards the middle of the target plane.
@@ -187,7 +191,7 @@ impl<'a> ScanRecord<'a> {
             schema: SCHEMA,
             program: env!("CARGO_PKG_NAME"),
             version: env!("CARGO_PKG_VERSION"),
-            equation: EQUATION,
+            equation: equation(scene.radar()),
             scene: json!({
                 "name": file.name,
                 "seed": file.seed,
@@ -334,6 +338,11 @@ fn effects(model: Option<&Model>) -> Vec<EffectRecord> {
         }
     }
     records
+}
+
+fn equation(radar: &Radar) -> String {
+    let air = if radar.air_loss_db_per_m == 0.0 { "" } else { AIR };
+    format!("{EQUATION}{air}")
 }
 
 /// What the beam is derived from, in m.
