@@ -9,7 +9,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::thread::sleep;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use crate::support::{matdb, root, tree};
 use serde_json::Value;
@@ -107,9 +107,8 @@ fn refused(folder: &Path, arguments: &[&str]) -> String {
 
 /// All files of a data set but the plan, in which times stand.
 fn made(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    let mut files = tree(folder);
-    files.remove("plan.toml");
-    files
+    let named = tree(folder).into_iter().map(|(path, bytes)| (path.display().to_string(), bytes));
+    named.filter(|(name, _)| name != "plan.toml").collect()
 }
 
 #[test]
@@ -177,7 +176,7 @@ fn repeats_differ_in_noise_alone_and_splits_share_no_object() {
     write_inputs(here, SPEC);
     said(here, &["dataset", "run", "spec.toml", "-o", "ds"]);
     let mut rows: Vec<Value> = Vec::new();
-    for (name, bytes) in tree(&here.join("ds")) {
+    for (name, bytes) in made(&here.join("ds")) {
         if name.starts_with("manifests/") {
             let manifest: Value = serde_json::from_slice(&bytes).unwrap();
             rows.extend(manifest["scans"].as_array().unwrap().clone());
@@ -395,6 +394,6 @@ fn killed_anywhere_it_goes_on_to_the_same_bytes() {
 
 /// The program that the tests run.
 fn program() -> std::path::PathBuf {
-    let command = matdb(&root());
+    let command = matdb(root());
     command.get_program().into()
 }

@@ -22,7 +22,7 @@ TWINS = {
     "diagnose": r"diagnose(_curve)?\(", "add": r"\.add\(", "list": r"list\(|\.materials\(", "search": r"\.search\(", "near": r"\.near\(",
     "show": r"\[\"[\w-]+\"\]", "diff": r"\.diff\(", "history": r"\.history\(", "cite": r"\.cite\(",
     "predict": r"\.predict\(", "fit": r"\bfit\(|, fit\b", "check": r"\.check\(", "rm": r"\.remove\(",
-    "withdraw": r"\.withdraw\(", "publish": r"\.publish\(", "verify": r"verify\(", "import": r"\.import_catalogue\(", "export": r"\.export\(",
+    "withdraw": r"\.withdraw\(", "publish": r"\.publish\(", "verify": r"verify\(", "import": r"\.import_catalogue\(", "export": r"\.export\(", "dataset": r"dataset\(",
 }
 
 PLATE = """

@@ -205,3 +205,93 @@ fn euler_deg(axes: &DMat3) -> [f64; 3] {
     let turns = [y.z.atan2(z.z), (-x.z).clamp(-1.0, 1.0).asin(), x.y.atan2(x.x)];
     turns.map(f64::to_degrees)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::draw::{Kind, stream};
+    use crate::frames::{Global, Model, Pose};
+    use crate::trace::winding_number;
+
+    const SCENE: &str = r#"
+        [[mesh]]
+        name = "ball"
+        file = "builtin:sphere"
+        size_m = [0.6, 0.5, 0.4]
+        translation_m = [0, 1.1, 0]
+        [[mesh]]
+        name = "plate"
+        file = "builtin:cuboid"
+        size_m = [0.1, 0.06, 0.01]
+        [[mesh]]
+        name = "cloth"
+        file = "builtin:sphere"
+        size_m = [0.6, 0.5, 0.4]
+        translation_m = [0, 1.1, 0]
+        offset_m = 0.03
+    "#;
+
+    fn placing(under: &[&str]) -> Placing {
+        Placing {
+            mesh: "plate".to_owned(),
+            on: "ball".to_owned(),
+            under: under.iter().map(|name| (*name).to_owned()).collect(),
+            within_box: None,
+            gap_m: 0.002,
+            turn_deg: [-180.0, 180.0],
+            most_tilt_deg: 45.0,
+        }
+    }
+
+    /// Puts the plate, and gives the scene.
+    fn placed(seed: u64, placing: &Placing) -> Result<SceneFile, Error> {
+        let mut file = SceneFile::parse(SCENE).unwrap();
+        let mut draws = stream(seed, 0, Kind::Place, 0);
+        put(placing, &mut file, Path::new("scene.toml"), &GivenMeshes::new(), &mut draws)?;
+        Ok(file)
+    }
+
+    #[test]
+    fn what_is_put_on_a_surface_cuts_neither_it_nor_what_goes_over_both() {
+        for seed in 0..20 {
+            let file = placed(seed, &placing(&["cloth"])).unwrap();
+            let mesh = |name: &str| {
+                let entry = entry(&file, name).unwrap();
+                placed_mesh(entry, Path::new("scene.toml"), &GivenMeshes::new()).unwrap()
+            };
+            let [ball, plate, cloth] = ["ball", "plate", "cloth"].map(mesh);
+            for vertex in &plate.vertices {
+                let inside = |mesh: &Mesh| winding_number(mesh, (*vertex).into()).abs() > 0.5;
+                assert!(!inside(&ball) && inside(&cloth), "{seed}: {vertex}");
+            }
+            let outwards = ball
+                .vertices
+                .iter()
+                .all(|vertex| winding_number(&plate, (*vertex).into()).abs() < 0.5);
+            assert!(outwards, "{seed}");
+        }
+    }
+
+    #[test]
+    fn the_turns_make_the_frame() {
+        for seed in 0..20 {
+            let mut draws = stream(seed, 1, Kind::Place, 0);
+            let turn = DVec3::from_array([0; 3].map(|_| 3.0 * (draws.uniform() - 0.5)));
+            let pose: Pose<Global, Model> = Pose::from_euler_xyz(turn, DVec3::ZERO);
+            let again = DVec3::from_array(euler_deg(&pose.rotation()).map(f64::to_radians));
+            let again: Pose<Global, Model> = Pose::from_euler_xyz(again, DVec3::ZERO);
+            assert!(again.rotation().abs_diff_eq(pose.rotation(), 1e-12), "{turn}");
+        }
+    }
+
+    #[test]
+    fn what_is_too_thick_for_its_cover_finds_no_place() {
+        let mut thick = placing(&["cloth"]);
+        thick.gap_m = 0.025;
+        let problem = placed(1, &thick).unwrap_err().to_string();
+        assert!(
+            problem.contains("`plate` under cloth") && problem.contains("offset_m"),
+            "{problem}"
+        );
+    }
+}

@@ -119,7 +119,7 @@ impl Dataset {
             Error::usage(format!("no temporary folder can be made: {reason}"), "set TMPDIR")
         })?;
         gathered.write(staged.path())?;
-        let recipe = recipe(staged.path(), &gathered.inputs())?;
+        let recipe = recipe(staged.path(), &gathered.inputs(), &gathered.scene)?;
         let plan = planned(&recipe, &gathered)?;
         gathered.write(folder)?;
         write_all(folder, &[(PLAN, to_toml(&plan)?.into_bytes())])?;
@@ -162,7 +162,7 @@ impl Dataset {
                 ));
             }
         }
-        let recipe = recipe(folder, &plan.input)?;
+        let recipe = recipe(folder, &plan.input, &folder.join(SCENE))?;
         Ok(Dataset { folder: folder.to_owned(), plan, recipe })
     }
 
@@ -197,6 +197,8 @@ impl Dataset {
 struct Gathered {
     /// By the names that the specification and the scene use.
     files: Vec<(Input, Vec<u8>)>,
+    /// Where the scene is.
+    scene: PathBuf,
 }
 
 impl Gathered {
@@ -216,7 +218,7 @@ impl Gathered {
             Some(_) => beside_spec,
             None => scene_path.parent().unwrap_or(Path::new("")),
         };
-        let mut gathered = Gathered { files: Vec::new() };
+        let mut gathered = Gathered { files: Vec::new(), scene: scene_path.clone() };
         gathered.add("specification", SPEC, spec_text.into_bytes());
         gathered.add("scene", SCENE, scene_text.clone().into_bytes());
         let names = Names::of(&spec, &scene, &scene_text, &scene_path)?;
@@ -308,8 +310,8 @@ impl Names {
     }
 }
 
-/// What scans are made of, from the files of a folder.
-fn recipe(folder: &Path, inputs: &[Input]) -> Result<Recipe, Error> {
+/// What scans are made of, from the files of a folder. Errors call the scene `shown`.
+fn recipe(folder: &Path, inputs: &[Input], shown: &Path) -> Result<Recipe, Error> {
     let spec_path = folder.join(SPEC);
     let spec_text = String::from_utf8_lossy(&read_small(&spec_path)?).into_owned();
     let spec = Spec::parse(&spec_text, &spec_path)?;
@@ -338,7 +340,7 @@ fn recipe(folder: &Path, inputs: &[Input]) -> Result<Recipe, Error> {
         // The copy is named from the folder of the program, and not from that of the scene.
         meshes.insert(name.clone(), file_mesh(&entry, Path::new(""), &GivenMeshes::new())?);
     }
-    Recipe::new(spec, &path, scene_text, meshes, materials, copies)
+    Recipe::new(spec, [&path, shown], scene_text, meshes, materials, copies)
 }
 
 /// The plan of a data set, from scans that are made to try it.

@@ -169,3 +169,67 @@ fn with_numbers(law: &Brdf, numbers: &[(String, f64)]) -> Option<Brdf> {
     }
     law.validate().is_ok().then_some(law)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::material::{Covariance, builtin};
+
+    fn spec() -> Spec {
+        Spec::parse("name = \"s\"\nscene = \"s.toml\"\nscans = 10", Path::new("s.toml")).unwrap()
+    }
+
+    /// A material whose fit has a covariance of its first two numbers, with these standard deviations and this correlation.
+    fn material(share: f64, correlation: f64) -> (Material, Vec<f64>) {
+        let mut material = builtin::get("mannequin-paint").unwrap().unwrap();
+        let fit = material.fits.iter_mut().find(|fit| fit.name == material.render).unwrap();
+        let numbers: Vec<_> = fit.model.parameters().into_iter().take(2).collect();
+        let sd: Vec<f64> = numbers.iter().map(|number| share * number.value).collect();
+        let across = correlation * sd[0] * sd[1];
+        let matrix = vec![vec![sd[0] * sd[0], across], vec![across, sd[1] * sd[1]]];
+        let parameters = numbers.into_iter().map(|number| number.path).collect();
+        fit.covariance = Some(Covariance { parameters, matrix });
+        fit.report = None;
+        (material, sd)
+    }
+
+    #[test]
+    fn draws_have_the_covariance_of_the_fit() {
+        let (material, sd) = material(0.05, 0.6);
+        let posterior = Posterior { material: "paint".to_owned(), fit: None, inflate: 2.0 };
+        let scatter = Scatter::new(&posterior, &material).unwrap();
+        let law = &material.fits.iter().find(|fit| fit.name == material.render).unwrap().model;
+        let mean: Vec<f64> = law.parameters().iter().take(2).map(|number| number.value).collect();
+        const DRAWS: u64 = 4000;
+        let off: Vec<[f64; 2]> = (0..DRAWS)
+            .map(|target| {
+                let drawn = scatter.draw(&spec(), target, 0).unwrap();
+                [0, 1].map(|place| (drawn.numbers[place].1 - mean[place]) / sd[place])
+            })
+            .collect();
+        let mean_of =
+            |value: &dyn Fn(&[f64; 2]) -> f64| off.iter().map(value).sum::<f64>() / DRAWS as f64;
+        // Four standard errors of moments of so many draws.
+        let error = 4.0 * 4.0 * (2.0 / DRAWS as f64).sqrt();
+        assert!(mean_of(&|off| off[0]).abs() < error && mean_of(&|off| off[1]).abs() < error);
+        for (product, expected) in [([0, 0], 4.0), ([1, 1], 4.0), ([0, 1], 2.4)] {
+            let [a, b] = product;
+            let found = mean_of(&|off| off[a] * off[b]);
+            assert!((found - expected).abs() < error, "{product:?}: {found}");
+        }
+    }
+
+    #[test]
+    fn no_law_that_is_drawn_reflects_more_than_it_receives() {
+        let (material, _) = material(0.9, 0.0);
+        let posterior = Posterior { material: "paint".to_owned(), fit: None, inflate: 1.0 };
+        let scatter = Scatter::new(&posterior, &material).unwrap();
+        for target in 0..50 {
+            let drawn = scatter.draw(&spec(), target, 0).unwrap().material;
+            let law = &drawn.fits.iter().find(|fit| fit.name == drawn.render).unwrap().model;
+            assert_eq!(Excess::of(law, drawn.theta_rad), None);
+        }
+    }
+}

@@ -20,8 +20,10 @@ use crate::setup::ReadyScene;
 /// A data set that can be made, scan by scan.
 pub(super) struct Recipe {
     pub spec: Spec,
-    /// Where the scene was, for errors.
+    /// Where the scene is, from which a file of rays is named.
     path: PathBuf,
+    /// What errors call it.
+    shown: PathBuf,
     /// The scene's text. Its meshes are `given:FILE`.
     scene: String,
     meshes: GivenMeshes,
@@ -48,7 +50,7 @@ impl Recipe {
     /// What contradicts the scene or its materials.
     pub fn new(
         spec: Spec,
-        path: &Path,
+        [path, shown]: [&Path; 2],
         scene: String,
         meshes: GivenMeshes,
         materials: BTreeMap<String, Material>,
@@ -71,12 +73,13 @@ impl Recipe {
         let effects = spec.effect.iter().map(|draw| EffectLaw::new(draw, &copies));
         let effects = effects.collect::<Result<Vec<_>, _>>()?;
         let splits = Split::all(&spec);
-        let file = SceneFile::parse(&scene).map_err(|error| format_error(path, error))?;
+        let file = SceneFile::parse(&scene).map_err(|error| format_error(shown, error))?;
         let classes = Classes::new(&spec, &file, materials.keys())?;
-        let path = path.to_owned();
+        let [path, shown] = [path, shown].map(Path::to_owned);
         Ok(Recipe {
             spec,
             path,
+            shown,
             scene,
             meshes,
             materials,
@@ -135,7 +138,7 @@ impl Recipe {
         drawn.note_all(&effects, &materials);
 
         let file = SceneFile::parse_changed(&self.scene, &drawn.changes);
-        let mut file = file.map_err(|error| format_error(&self.path, error))?;
+        let mut file = file.map_err(|error| format_error(&self.shown, error))?;
         file.name = self.key(scan);
         for entry in &mut file.mesh {
             if entry.is_in_a_file() || entry.file.starts_with("builtin:") {
@@ -151,7 +154,7 @@ impl Recipe {
         let mut placed = Vec::new();
         for (entry, placing) in spec.place.iter().enumerate() {
             let mut draws = stream(spec.seed, target, Kind::Place, entry);
-            let put = place::put(placing, &mut file, &self.path, &self.meshes, &mut draws)?;
+            let put = place::put(placing, &mut file, &self.shown, &self.meshes, &mut draws)?;
             placed.push((placing.mesh.clone(), put));
         }
         let mut given: GivenMaterials = self.materials.clone();
@@ -167,9 +170,11 @@ impl Recipe {
                 }
             }
         }
-        let mut scene = Scene::resolve_given(file, &self.path, &self.meshes)?;
+        let has_own_rays = matches!(file.radar.scan, Pattern::Rays(_) | Pattern::Angles(_));
+        let path = if has_own_rays { &self.path } else { &self.shown };
+        let mut scene = Scene::resolve_given(file, path, &self.meshes)?;
         scene.given = given;
-        let ready = ReadyScene::new(scene, &self.path, None)?;
+        let ready = ReadyScene::new(scene, &self.shown, None)?;
         Ok(Target { ready, drawn, placed })
     }
 

@@ -110,3 +110,60 @@ fn options(spec: &Spec, splits: &[(&str, f64)], entry: usize, choice: &Choice) -
     }
     of_splits
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    fn spec(text: &str) -> Spec {
+        let options = (0..7).map(|n| format!("{{ name = \"o{n}\", set = {{ seed = {n} }} }}"));
+        let options = options.collect::<Vec<_>>().join(", ");
+        let text = format!(
+            "name = \"s\"\nscene = \"s.toml\"\n{text}\n[[choose]]\nname = \"c\"\napart = true\noption = [{options}]\n"
+        );
+        Spec::parse(&text, Path::new("spec.toml")).unwrap()
+    }
+
+    #[test]
+    fn every_scan_is_in_one_split_and_one_shard() {
+        let spec =
+            spec("scans = 106\nrepeats = 2\nscans_per_shard = 9\nsplit = { a = 3, b = 1, c = 1 }");
+        let splits = Split::all(&spec);
+        let scans: Vec<u32> = splits
+            .iter()
+            .flat_map(|split| {
+                (split.first_shard..split.first_shard + split.shards)
+                    .map(move |shard| (split, shard))
+            })
+            .flat_map(|(split, shard)| split.scans_of(&spec, shard))
+            .collect();
+        assert_eq!(scans, (0..106).collect::<Vec<_>>());
+        assert!(splits.iter().all(|split| split.scans % 2 == 0 && split.first % 2 == 0));
+        assert_eq!(splits.iter().map(|split| split.scans).collect::<Vec<_>>(), [64, 22, 20]);
+        assert_eq!(splits[1].shard_name(splits[1].first_shard), "b-00000-of-00003");
+    }
+
+    #[test]
+    fn splits_share_no_option_that_is_kept_apart() {
+        for seed in 0..20 {
+            let spec =
+                spec(&format!("scans = 10\nseed = {seed}\nsplit = {{ a = 8, b = 1, c = 1 }}"));
+            let splits = Split::all(&spec);
+            let mut all: Vec<usize> =
+                splits.iter().flat_map(|split| split.options[0].clone()).collect();
+            assert!(splits.iter().all(|split| !split.options[0].is_empty()));
+            all.sort_unstable();
+            assert_eq!(all, (0..7).collect::<Vec<_>>(), "{seed}");
+        }
+    }
+
+    #[test]
+    fn an_option_is_in_the_split_that_it_names() {
+        let mut spec = spec("scans = 10\nsplit = { a = 1, b = 1 }");
+        spec.choose[0].option[3].split = Some("b".to_owned());
+        let splits = Split::all(&spec);
+        assert!(splits[1].options[0].contains(&3) && !splits[0].options[0].contains(&3));
+    }
+}
