@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::draw::{Kind, stream};
-use super::spec::{EffectDraw, Spec};
+use super::spec::{EffectDraw, Spec, refused};
+use super::streams::{Kind, stream};
 use crate::effects::{Level, find};
 use crate::error::Error;
 use crate::files::read_small;
@@ -47,14 +47,9 @@ impl EffectLaw {
     /// # Errors
     /// An effect or a parameter that there is not, a range beyond that of the parameter, and a report that did not find it.
     pub fn new(draw: &EffectDraw, copies: &BTreeMap<String, PathBuf>) -> Result<EffectLaw, Error> {
-        let refused = |problem: String, way_out: String| {
-            Error::usage(format!("[[effect]] `{}`: {problem}", draw.name), way_out)
-        };
+        let place = format!("[[effect]] `{}`", draw.name);
         let Some(effect) = find(&draw.name) else {
-            return Err(refused(
-                "there is no such effect".to_owned(),
-                "`matdb effects` lists them".to_owned(),
-            ));
+            return Err(refused(&place, "there is no such effect", "`matdb effects` lists them"));
         };
         let level = effect.level();
         if (level == Level::Material) != draw.material.is_some() {
@@ -63,8 +58,9 @@ impl EffectLaw {
                 _ => "leave material out: it is no effect of a material",
             };
             return Err(refused(
+                &place,
                 format!("it is an effect of the {}", level.as_str()),
-                way_out.to_owned(),
+                way_out,
             ));
         }
         let laws = match &draw.report {
@@ -83,13 +79,14 @@ impl EffectLaw {
             let Some(known) = known else {
                 let names: Vec<&str> = effect.parameters().iter().map(|known| known.name).collect();
                 let problem = format!("it has no parameter `{name}`");
-                return Err(refused(problem, format!("there are: {}", names.join(", "))));
+                return Err(refused(&place, problem, format!("there are: {}", names.join(", "))));
             };
             if let Law::Uniform([from, to]) = law
                 && !(known.min <= from && to <= known.max)
             {
                 let problem = format!("{name} from {from} to {to} is out of range");
                 return Err(refused(
+                    &place,
                     problem,
                     format!("give values from {} to {}", known.min, known.max),
                 ));
@@ -121,17 +118,15 @@ impl EffectLaw {
 
 /// The numbers that a diagnosis states of an effect, by their names.
 fn stated(report: &Path, name: &str) -> Result<Vec<(String, Law)>, Error> {
-    let refused = |problem: &str, way_out: &str| {
-        Error::usage(format!("{}: {problem}", report.display()), way_out.to_owned())
-    };
+    let place = report.display();
     let text = read_small(report)?;
     let record: Value = serde_json::from_slice(&text).map_err(|error| {
-        refused(&format!("is no JSON ({error})"), "name the report.json of a diagnosis")
+        refused(&place, format!("is no JSON ({error})"), "name the report.json of a diagnosis")
     })?;
     let found = record["effects"].as_array().into_iter().flatten();
     let Some(effect) = found.into_iter().find(|effect| effect["name"] == name) else {
         let problem = format!("has not found the effect `{name}`");
-        return Err(refused(&problem, "name one that it found, or give parameters"));
+        return Err(refused(&place, problem, "name one that it found, or give parameters"));
     };
     let numbers = effect["parameters"].as_object().into_iter().flatten();
     let laws: Vec<(String, Law)> = numbers
@@ -141,7 +136,7 @@ fn stated(report: &Path, name: &str) -> Result<Vec<(String, Law)>, Error> {
         })
         .collect();
     if laws.is_empty() {
-        return Err(refused("states no numbers of it", "give parameters"));
+        return Err(refused(&place, "states no numbers of it", "give parameters"));
     }
     Ok(laws)
 }

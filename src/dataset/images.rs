@@ -72,27 +72,23 @@ pub(super) fn members(
         return Err(Error::usage("a scan has no view", "report this"));
     };
     let shown = nearest_sights(ready, image, sights);
-    let pixels = |value: &dyn Fn(&Sight) -> f64| {
-        let values = shown.iter().map(|sight| sight.map_or(f32::NAN, |sight| value(sight) as f32));
-        values.collect::<Vec<f32>>()
-    };
     let truth = Raster {
         channels: vec![
-            Channel { name: "depth_m".to_owned(), values: pixels(&|sight| sight.hit.range_m) },
+            Channel {
+                name: "depth_m".to_owned(),
+                values: pixels(&shown, |sight| sight.hit.range_m),
+            },
             Channel {
                 name: "incidence_deg".to_owned(),
-                values: pixels(&|sight| sight.hit.theta_rad().to_degrees()),
+                values: pixels(&shown, |sight| sight.hit.theta_rad().to_degrees()),
             },
         ],
         ..only(image, &[])
     };
     members.push(("truth.exr".to_owned(), exr::write(&truth, &[])?));
     let size = [image.width as u32, image.height as u32];
-    let numbers = |value: fn(&Sight) -> u16| -> Vec<u16> {
-        shown.iter().map(|sight| sight.map_or(0, value)).collect()
-    };
-    let instances = numbers(|sight| sight.instance);
-    let material = numbers(|sight| sight.material.saturating_add(1));
+    let instances = numbers(&shown, |sight| sight.instance);
+    let material = numbers(&shown, |sight| sight.material.saturating_add(1));
     for (name, values) in [("instance", &instances), ("material", &material)] {
         members.push((format!("{name}.png"), grey_png(size, values)?));
     }
@@ -107,6 +103,29 @@ pub(super) fn members(
     let text = serde_json::to_vec(&record).unwrap_or_default();
     members.push(("json".to_owned(), text));
     Ok((members, record))
+}
+
+/// A channel of what pixels show; NaN where they show nothing.
+fn pixels(shown: &[Option<&Sight>], value: fn(&Sight) -> f64) -> Vec<f32> {
+    shown.iter().map(|sight| sight.map_or(f32::NAN, |sight| value(sight) as f32)).collect()
+}
+
+/// A number of what pixels show; 0 where they show nothing.
+fn numbers(shown: &[Option<&Sight>], value: fn(&Sight) -> u16) -> Vec<u16> {
+    shown.iter().map(|sight| sight.map_or(0, value)).collect()
+}
+
+/// The pixels, of so many from a first edge, m, whose centres are within a radius of a place.
+fn covered(
+    image: &Raster,
+    at_m: f64,
+    min_m: f64,
+    count: usize,
+    radius_m: f64,
+) -> std::ops::Range<usize> {
+    let first = ((at_m - radius_m - min_m) / image.pixel_m - 0.5).ceil().max(0.0);
+    let end = ((at_m + radius_m - min_m) / image.pixel_m + 0.5).floor().max(0.0);
+    first as usize..(end as usize).min(count)
 }
 
 /// Some channels of an image.
@@ -128,16 +147,9 @@ fn nearest_sights<'a>(
     let frames = radar.frames();
     let aims = ready.scene.chirps.target_points_m(&frames);
     for (aim, sight) in aims.zip(sights) {
-        let first = |at_m: f64, min_m: f64| {
-            (((at_m - radius_m - min_m) / image.pixel_m - 0.5).ceil().max(0.0)) as usize
-        };
-        let end = |at_m: f64, min_m: f64, count: usize| {
-            ((((at_m + radius_m - min_m) / image.pixel_m + 0.5).floor()).max(0.0) as usize)
-                .min(count)
-        };
-        let columns = first(aim.x, image.x_min_m)..end(aim.x, image.x_min_m, image.width);
+        let columns = covered(image, aim.x, image.x_min_m, image.width, radius_m);
         // Counted from below.
-        for from_below in first(aim.y, image.y_min_m)..end(aim.y, image.y_min_m, image.height) {
+        for from_below in covered(image, aim.y, image.y_min_m, image.height, radius_m) {
             let row = image.height - 1 - from_below;
             for column in columns.clone() {
                 let (dx, dy) = (image.x_m(column) - aim.x, image.y_m(row) - aim.y);

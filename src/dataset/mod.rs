@@ -24,8 +24,10 @@ mod recipe;
 mod run;
 mod scan;
 mod scans;
+mod shard;
 mod spec;
 mod split;
+mod streams;
 mod table;
 
 pub use check::DatasetCheck;

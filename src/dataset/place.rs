@@ -55,15 +55,15 @@ pub(super) fn put(
     draws: &mut Draws,
 ) -> Result<Put, Error> {
     let radar = file.radar.frames().origin().xyz;
-    let load = |entry: &MeshEntry| placed_mesh(entry, path, meshes);
-    let surface = Surface::new(load(entry(file, &placing.on)?)?, radar, placing);
+    let surface =
+        Surface::new(placed_mesh(entry(file, &placing.on)?, path, meshes)?, radar, placing);
     let mut own = entry(file, &placing.mesh)?.clone();
     (own.rotation_deg, own.translation_m) = ([0.0; 3], [0.0; 3]);
-    let object = load(&own)?;
+    let object = placed_mesh(&own, path, meshes)?;
     let over: Vec<Mesh> = placing
         .under
         .iter()
-        .map(|name| Ok(load(entry(file, name)?)?))
+        .map(|name| Ok(placed_mesh(entry(file, name)?, path, meshes)?))
         .collect::<Result<_, Error>>()?;
     let outline = Outline::of(&object);
     for _ in 0..MOST_TRIES {
@@ -209,7 +209,7 @@ fn euler_deg(axes: &DMat3) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::draw::{Kind, stream};
+    use crate::dataset::streams::{Kind, stream};
     use crate::frames::{Global, Model, Pose};
     use crate::trace::winding_number;
 
@@ -251,24 +251,28 @@ mod tests {
         Ok(file)
     }
 
+    fn mesh(file: &SceneFile, name: &str) -> Mesh {
+        let entry = entry(file, name).unwrap();
+        placed_mesh(entry, Path::new("scene.toml"), &GivenMeshes::new()).unwrap()
+    }
+
+    fn is_inside(mesh: &Mesh, point: DVec3) -> bool {
+        winding_number(mesh, point.into()).abs() > 0.5
+    }
+
     #[test]
     fn what_is_put_on_a_surface_cuts_neither_it_nor_what_goes_over_both() {
         for seed in 0..20 {
             let file = placed(seed, &placing(&["cloth"])).unwrap();
-            let mesh = |name: &str| {
-                let entry = entry(&file, name).unwrap();
-                placed_mesh(entry, Path::new("scene.toml"), &GivenMeshes::new()).unwrap()
-            };
-            let [ball, plate, cloth] = ["ball", "plate", "cloth"].map(mesh);
+            let [ball, plate, cloth] = ["ball", "plate", "cloth"].map(|name| mesh(&file, name));
             for vertex in &plate.vertices {
-                let inside = |mesh: &Mesh| winding_number(mesh, (*vertex).into()).abs() > 0.5;
-                assert!(!inside(&ball) && inside(&cloth), "{seed}: {vertex}");
+                assert!(
+                    !is_inside(&ball, *vertex) && is_inside(&cloth, *vertex),
+                    "{seed}: {vertex}"
+                );
             }
-            let outwards = ball
-                .vertices
-                .iter()
-                .all(|vertex| winding_number(&plate, (*vertex).into()).abs() < 0.5);
-            assert!(outwards, "{seed}");
+            let is_whole = !ball.vertices.iter().any(|vertex| is_inside(&plate, *vertex));
+            assert!(is_whole, "{seed}");
         }
     }
 

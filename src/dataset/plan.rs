@@ -11,10 +11,9 @@ use serde::{Deserialize, Serialize};
 use super::labels::Classes;
 use super::layout::{MATERIALS, PLAN, SCENE, SPEC};
 use super::recipe::Recipe;
-use super::run::ShardFiles;
 use super::scan::MadeScan;
+use super::shard::ShardFiles;
 use super::spec::{Spec, format_error};
-use super::split::Split;
 use crate::error::Error;
 use crate::files::{Placement, read_small, read_whole, write_all};
 use crate::formats::text::{from_toml, to_toml};
@@ -211,8 +210,8 @@ impl Gathered {
             None => beside_spec.join(&spec.scene),
         };
         let scene_text = read_text(&scene_path)?;
-        let at = |error| format_error(&scene_path, error);
-        let scene = SceneFile::parse(&scene_text).map_err(at)?;
+        let scene = SceneFile::parse(&scene_text);
+        let scene = scene.map_err(|error| format_error(&scene_path, error))?;
         // Files of a built-in scene's changes lie beside the specification.
         let beside_scene = match builtin::name(&scene_path) {
             Some(_) => beside_spec,
@@ -275,6 +274,8 @@ impl Gathered {
 struct Names {
     /// Files of meshes and of rays.
     files: BTreeSet<String>,
+    /// Meshes that are built in.
+    built_in: BTreeSet<String>,
     materials: BTreeSet<String>,
 }
 
@@ -282,7 +283,6 @@ impl Names {
     fn of(spec: &Spec, scene: &SceneFile, text: &str, path: &Path) -> Result<Names, Error> {
         let mut names = Names::default();
         names.add(scene);
-        let at = |error| format_error(path, error);
         // Each option by itself, and each value: what they set is in one of them.
         let sets = spec.choose.iter().flat_map(|choice| &choice.option).map(|option| {
             option.set.iter().map(|(key, value)| (key.clone(), value.clone())).collect::<Vec<_>>()
@@ -294,15 +294,19 @@ impl Names {
         });
         for set in sets.chain(values) {
             let changes = set.into_iter().map(|(key, value)| KeyChange::new(&key, value));
-            let changes = changes.collect::<Result<Vec<_>, _>>().map_err(at)?;
-            names.add(&SceneFile::parse_changed(text, &changes).map_err(at)?);
+            let changed = changes
+                .collect::<Result<Vec<_>, _>>()
+                .and_then(|changes| SceneFile::parse_changed(text, &changes));
+            names.add(&changed.map_err(|error| format_error(path, error))?);
         }
         Ok(names)
     }
 
     fn add(&mut self, scene: &SceneFile) {
-        let meshes = scene.mesh.iter().filter(|mesh| mesh.is_in_a_file());
-        self.files.extend(meshes.map(|mesh| mesh.file.clone()));
+        for mesh in &scene.mesh {
+            let names = if mesh.is_in_a_file() { &mut self.files } else { &mut self.built_in };
+            names.insert(mesh.file.clone());
+        }
         if let Pattern::Rays(explicit) | Pattern::Angles(explicit) = &scene.radar.scan {
             self.files.insert(explicit.file.clone());
         }
@@ -317,8 +321,7 @@ fn recipe(folder: &Path, inputs: &[Input], shown: &Path) -> Result<Recipe, Error
     let spec = Spec::parse(&spec_text, &spec_path)?;
     let path = folder.join(SCENE);
     let scene_text = String::from_utf8_lossy(&read_small(&path)?).into_owned();
-    let at = |error| format_error(&path, error);
-    let scene = SceneFile::parse(&scene_text).map_err(at)?;
+    let scene = SceneFile::parse(&scene_text).map_err(|error| format_error(shown, error))?;
     let materials: BTreeMap<String, Material> =
         serde_json::from_slice(&read_whole(&folder.join(MATERIALS))?).map_err(|error| {
             let problem = format!("{}: {error}", folder.join(MATERIALS).display());
@@ -326,10 +329,11 @@ fn recipe(folder: &Path, inputs: &[Input], shown: &Path) -> Result<Recipe, Error
         })?;
     let copies: BTreeMap<String, PathBuf> =
         inputs.iter().map(|one| (one.name.clone(), folder.join(&one.file))).collect();
-    let names = Names::of(&spec, &scene, &scene_text, &path)?;
+    let names = Names::of(&spec, &scene, &scene_text, shown)?;
     let mut meshes = GivenMeshes::new();
-    for entry in scene.mesh.iter().filter(|entry| entry.file.starts_with("builtin:")) {
-        meshes.insert(entry.file.clone(), file_mesh(entry, &path, &GivenMeshes::new())?);
+    for name in &names.built_in {
+        let entry = MeshEntry::of_file(name, name);
+        meshes.insert(name.clone(), file_mesh(&entry, shown, &GivenMeshes::new())?);
     }
     for name in &names.files {
         let Some(copy) = copies.get(name).filter(|_| !name.ends_with(".csv")) else { continue };
@@ -347,10 +351,10 @@ fn recipe(folder: &Path, inputs: &[Input], shown: &Path) -> Result<Recipe, Error
 fn planned(recipe: &Recipe, gathered: &Gathered) -> Result<Plan, Error> {
     let spec = &recipe.spec;
     let drawn = spec.scans.min(DRAWN);
-    let spread = |number: u32| u64::from(number) * u64::from(spec.scans) / u64::from(drawn);
-    (0..drawn)
-        .into_par_iter()
-        .try_for_each(|number| recipe.target(spread(number) as u32).map(drop))?;
+    (0..drawn).into_par_iter().try_for_each(|number| {
+        let scan = u64::from(number) * u64::from(spec.scans) / u64::from(drawn);
+        recipe.target(scan as u32).map(drop)
+    })?;
     let pool = ThreadPoolBuilder::new()
         .num_threads(1)
         .build()
@@ -379,20 +383,11 @@ fn planned(recipe: &Recipe, gathered: &Gathered) -> Result<Plan, Error> {
     id.update(PROGRAM.as_bytes());
     id.update(first_scan.as_bytes());
     gathered.files.iter().for_each(|(input, _)| _ = id.update(input.blake3.as_bytes()));
-    let apart = |split: &Split| {
-        let choices = spec.choose.iter().zip(&split.options).filter(|(choice, _)| choice.apart);
-        choices
-            .map(|(choice, places)| {
-                let names = places.iter().map(|place| choice.option[*place].name.clone());
-                (choice.name.clone(), names.collect())
-            })
-            .collect()
-    };
     let split = recipe.splits.iter().map(|split| PlannedSplit {
         name: split.name.clone(),
         scans: split.scans,
         shards: split.shards,
-        apart: apart(split),
+        apart: split.apart(spec),
     });
     Ok(Plan {
         name: spec.name.clone(),

@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::draw::{Kind, stream};
-use super::spec::{Posterior, Spec};
+use super::spec::{Posterior, Spec, refused};
+use super::streams::{Kind, stream};
 use crate::brdf::{Brdf, Excess};
 use crate::error::Error;
 use crate::material::{Fit, Material};
@@ -43,9 +43,7 @@ impl Scatter {
     /// A material without this fit, or a fit without a covariance.
     pub fn new(posterior: &Posterior, material: &Material) -> Result<Scatter, Error> {
         let Posterior { material: name, fit: wanted, .. } = posterior;
-        let refused = |problem: String, way_out: &str| {
-            Error::usage(format!("[[posterior]] of `{name}`: {problem}"), way_out.to_owned())
-        };
+        let place = format!("[[posterior]] of `{name}`");
         let wanted = wanted.as_ref().unwrap_or(&material.render);
         let names: Vec<&str> = material.fits.iter().map(|fit| fit.name.as_str()).collect();
         let Some(place) = names.iter().position(|known| known == wanted) else {
@@ -53,14 +51,18 @@ impl Scatter {
                 [] => "it has none: fit a curve of it, or leave the entry out".to_owned(),
                 _ => format!("there are: {}", names.join(", ")),
             };
-            return Err(refused(format!("there is no fit `{wanted}`"), &way_out));
+            return Err(refused(&place, format!("there is no fit `{wanted}`"), way_out));
         };
         let fit = &material.fits[place];
         let numbers = scattering_numbers(fit);
         let factor = covariance(fit, &numbers).and_then(|matrix| matrix.cholesky());
         let (Some(factor), false) = (factor, numbers.is_empty()) else {
             let problem = format!("the fit `{wanted}` has no covariance of its numbers");
-            return Err(refused(problem, "take a fit of `matdb fit`, or leave the entry out"));
+            return Err(refused(
+                place,
+                problem,
+                "take a fit of `matdb fit`, or leave the entry out",
+            ));
         };
         let paths = numbers.into_iter().map(|(_, path, scale)| (path, scale)).collect();
         let material = material.clone();
@@ -144,14 +146,11 @@ fn covariance(fit: &Fit, numbers: &[(usize, String, f64)]) -> Option<DMatrix<f64
         Some(report) => &report.covariance,
         None => &fit.covariance.as_ref()?.matrix,
     };
-    let entry = |a: usize, b: usize| {
-        let entry = |a: usize, b: usize| matrix.get(a)?.get(b).copied();
-        Some(0.5 * (entry(a, b)? + entry(b, a)?))
-    };
     let mut square = DMatrix::zeros(numbers.len(), numbers.len());
     for (row, (a, ..)) in numbers.iter().enumerate() {
         for (column, (b, ..)) in numbers.iter().enumerate() {
-            square[(row, column)] = entry(*a, *b)?;
+            let (above, below) = (matrix.get(*a)?.get(*b)?, matrix.get(*b)?.get(*a)?);
+            square[(row, column)] = 0.5 * (above + below);
         }
     }
     Some(square)

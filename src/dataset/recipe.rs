@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::draw::{Drawn, Kind, stream};
+use super::draw::Drawn;
 use super::effect::{DrawnEffect, EffectLaw};
 use super::labels::Classes;
 use super::place::{self, Put};
 use super::posterior::{DrawnMaterial, Scatter};
 use super::spec::{Spec, format_error};
 use super::split::Split;
+use super::streams::{Kind, stream};
 use crate::effects::Level;
 use crate::error::Error;
 use crate::material::Material;
@@ -141,9 +142,7 @@ impl Recipe {
         let mut file = file.map_err(|error| format_error(&self.shown, error))?;
         file.name = self.key(scan);
         for entry in &mut file.mesh {
-            if entry.is_in_a_file() || entry.file.starts_with("builtin:") {
-                entry.file = format!("given:{}", entry.file);
-            }
+            entry.file = format!("given:{}", entry.file);
         }
         if let Pattern::Rays(explicit) | Pattern::Angles(explicit) = &mut file.radar.scan
             && let Some(copy) = self.copies.get(&explicit.file)

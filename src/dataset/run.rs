@@ -9,14 +9,11 @@ use std::thread;
 use rayon::ThreadPoolBuilder;
 use serde::{Deserialize, Serialize};
 
-use super::archive::archive;
-use super::images::Members;
 use super::layout;
 use super::plan::Dataset;
-use super::points;
-use super::scan::{MadeScan, ScanRow};
+use super::scan::ScanRow;
 use super::scans;
-use super::table;
+use super::shard::ShardFiles;
 use crate::error::Error;
 use crate::files::{Placement, read_whole};
 
@@ -59,41 +56,6 @@ pub(super) struct ShardFile {
     pub file: String,
     pub bytes: u64,
     pub blake3: String,
-}
-
-/// The bytes of a shard's files.
-pub(super) struct ShardFiles {
-    points: Vec<u8>,
-    images: Option<Vec<u8>>,
-}
-
-impl ShardFiles {
-    /// Encodes some scans.
-    ///
-    /// # Errors
-    /// What cannot be encoded.
-    pub fn new(scans: &[MadeScan]) -> Result<ShardFiles, Error> {
-        let groups = scans.iter().map(|scan| scan.points.clone());
-        let points = table::write("points", &points::columns(), groups)?;
-        let members: Vec<(String, Members)> =
-            scans.iter().map(|scan| (scan.record.key.clone(), scan.images.clone())).collect();
-        let has_images = members.iter().any(|(_, members)| !members.is_empty());
-        let images = has_images.then(|| archive(&members)).transpose()?;
-        Ok(ShardFiles { points, images })
-    }
-
-    /// The hash of all of it.
-    pub fn blake3(&self) -> String {
-        let mut hasher = blake3::Hasher::new();
-        hasher.update(&self.points);
-        self.images.iter().for_each(|images| _ = hasher.update(images));
-        hasher.finalize().to_hex().to_string()
-    }
-
-    /// Number of bytes.
-    pub fn bytes(&self) -> u64 {
-        (self.points.len() + self.images.as_ref().map_or(0, Vec::len)) as u64
-    }
 }
 
 impl Dataset {

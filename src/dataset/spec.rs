@@ -26,6 +26,7 @@
 //! ```
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Display;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -374,26 +375,22 @@ impl Variation {
                 let is_range = from.len() == to.len()
                     && from.iter().chain(to).all(|end| end.is_finite())
                     && from.iter().zip(to).all(|(from, to)| from <= to);
-                let problem = || {
-                    (
-                        format!("{from:?} to {to:?} is no range"),
-                        "give as many numbers in both, the smaller ones in from",
-                    )
-                };
-                is_range.then_some(()).ok_or_else(problem)
+                if is_range {
+                    return Ok(());
+                }
+                let problem = format!("{from:?} to {to:?} is no range");
+                Err((problem, "give as many numbers in both, the smaller ones in from"))
             }
             (None, None, Some(mean), Some(sd), []) => {
                 let (mean, sd) = (mean.list(), sd.list());
                 let is_law = mean.len() == sd.len()
                     && mean.iter().chain(sd).all(|number| number.is_finite())
                     && sd.iter().all(|sd| *sd >= 0.0);
-                let problem = || {
-                    (
-                        format!("mean {mean:?} and sd {sd:?} are no normal law"),
-                        "give as many numbers in both, sd 0 or more",
-                    )
-                };
-                is_law.then_some(()).ok_or_else(problem)
+                if is_law {
+                    return Ok(());
+                }
+                let problem = format!("mean {mean:?} and sd {sd:?} are no normal law");
+                Err((problem, "give as many numbers in both, sd 0 or more"))
             }
             (None, None, None, None, [_, ..]) => Ok(()),
             _ => Err(("says not one way to draw".to_owned(), WAYS)),
@@ -422,19 +419,24 @@ impl Numbers {
 impl Placing {
     fn check(&self) -> Result<(), (String, &'static str)> {
         let Placing { mesh, on, gap_m, turn_deg: [from, to], most_tilt_deg, .. } = self;
-        let at = |problem: String| format!("[[place]] of `{mesh}`: {problem}");
         if mesh == on || self.under.contains(mesh) {
-            return Err((at(format!("on `{on}` or under itself")), "name other meshes"));
+            return Err((
+                format!("[[place]] of `{mesh}`: on `{on}` or under itself"),
+                "name other meshes",
+            ));
         }
         if !(0.0..=1.0).contains(gap_m) {
-            return Err((at(format!("gap_m = {gap_m}")), "give 0 to 1"));
+            return Err((format!("[[place]] of `{mesh}`: gap_m = {gap_m}"), "give 0 to 1"));
         }
         if !(from <= to && from.is_finite() && to.is_finite()) {
-            return Err((at(format!("turn_deg = [{from}, {to}]")), "give the smaller one first"));
+            return Err((
+                format!("[[place]] of `{mesh}`: turn_deg = [{from}, {to}]"),
+                "give the smaller one first",
+            ));
         }
         if !(*most_tilt_deg > 0.0 && *most_tilt_deg < 90.0) {
             return Err((
-                at(format!("most_tilt_deg = {most_tilt_deg}")),
+                format!("[[place]] of `{mesh}`: most_tilt_deg = {most_tilt_deg}"),
                 "give more than 0 and less than 90",
             ));
         }
@@ -444,25 +446,35 @@ impl Placing {
 
 impl EffectDraw {
     fn check(&self) -> Result<(), (String, &'static str)> {
-        let at = |problem: String| format!("[[effect]] `{}`: {problem}", self.name);
+        let name = &self.name;
         if !(0.0..=1.0).contains(&self.share) {
-            return Err((at(format!("share = {}", self.share)), "give 0 to 1"));
+            return Err((format!("[[effect]] `{name}`: share = {}", self.share), "give 0 to 1"));
         }
         if self.parameters.is_empty() == self.report.is_none() {
-            let problem = at("has parameters and a report, or neither".to_owned());
+            let problem = format!("[[effect]] `{name}`: has parameters and a report, or neither");
             return Err((
                 problem,
                 "give parameters = { level_db = [-1, 1] } or the like, or the report of a diagnosis",
             ));
         }
-        for (name, [from, to]) in &self.parameters {
+        for (parameter, [from, to]) in &self.parameters {
             if !(from <= to && from.is_finite() && to.is_finite()) {
-                let problem = at(format!("{name} from {from} to {to} is no range"));
+                let problem =
+                    format!("[[effect]] `{name}`: {parameter} from {from} to {to} is no range");
                 return Err((problem, "give the smaller one first"));
             }
         }
         Ok(())
     }
+}
+
+/// A refusal with its place.
+pub(super) fn refused(
+    place: impl Display,
+    problem: impl Display,
+    way_out: impl Into<String>,
+) -> Error {
+    Error::usage(format!("{place}: {problem}"), way_out)
 }
 
 /// The error of a file whose text cannot be taken.
@@ -475,11 +487,9 @@ fn check_name(key: &str, name: &str) -> Result<(), (String, &'static str)> {
     let is_name = !name.is_empty()
         && name.len() <= 64
         && name.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-');
-    let problem = || {
-        (
-            format!("{key} = {name:?} is no name"),
-            "take small letters, digits and hyphens, 64 at most",
-        )
-    };
-    is_name.then_some(()).ok_or_else(problem)
+    if is_name {
+        return Ok(());
+    }
+    let problem = format!("{key} = {name:?} is no name");
+    Err((problem, "take small letters, digits and hyphens, 64 at most"))
 }

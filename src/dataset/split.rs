@@ -1,7 +1,9 @@
 //! The splits of a data set, and which options of its choices each of them has.
 
-use super::draw::{Kind, stream};
+use std::collections::BTreeMap;
+
 use super::spec::{Choice, Spec};
+use super::streams::{Kind, stream};
 
 /// A part of the scans that shares no option of the choices that are kept apart with another.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,6 +57,16 @@ impl Split {
     pub fn scans_of(&self, spec: &Spec, shard: u32) -> std::ops::Range<u32> {
         let from = self.first + (shard - self.first_shard) * per_shard(spec);
         from..(from + per_shard(spec)).min(self.first + self.scans)
+    }
+
+    /// The names of the options that it has of the choices that are kept apart.
+    pub fn apart(&self, spec: &Spec) -> BTreeMap<String, Vec<String>> {
+        let choices = spec.choose.iter().zip(&self.options).filter(|(choice, _)| choice.apart);
+        let names = choices.map(|(choice, places)| {
+            let options = places.iter().map(|place| choice.option[*place].name.clone());
+            (choice.name.clone(), options.collect())
+        });
+        names.collect()
     }
 
     /// Name of a shard: `train-00000-of-00004`.

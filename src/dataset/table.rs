@@ -105,7 +105,6 @@ fn encoded(
 }
 
 fn field(column: &Column) -> Result<Arc<Type>, ParquetError> {
-    let integer = |bit_width| Some(LogicalType::Integer(IntType { bit_width, is_signed: true }));
     let (physical, logical) = match column.kind {
         Kind::Int8 => (Physical::INT32, integer(8)),
         Kind::Int16 => (Physical::INT32, integer(16)),
@@ -121,6 +120,10 @@ fn field(column: &Column) -> Result<Arc<Type>, ParquetError> {
         .with_converted_type(ConvertedType::NONE)
         .build();
     field.map(Arc::new)
+}
+
+fn integer(bit_width: i8) -> Option<LogicalType> {
+    Some(LogicalType::Integer(IntType { bit_width, is_signed: true }))
 }
 
 fn properties(columns: &[Column]) -> Result<WriterPropertiesPtr, ParquetError> {

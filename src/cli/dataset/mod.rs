@@ -4,8 +4,7 @@ mod check;
 mod plan;
 mod publish;
 mod run;
-
-use std::path::PathBuf;
+mod source;
 
 use clap::Subcommand;
 
@@ -43,14 +42,4 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         Command::Check(args) => check::run(args, console),
         Command::Publish(args) => publish::run(args, console),
     }
-}
-
-/// A specification and the folder for what is made of it.
-#[derive(Debug, clap::Args)]
-struct Source {
-    /// The specification
-    spec: PathBuf,
-    /// Folder of the data set; created if needed
-    #[arg(long, short, value_name = "DIR")]
-    output: PathBuf,
 }

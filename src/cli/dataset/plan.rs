@@ -1,6 +1,6 @@
 //! `matdb dataset plan`.
 
-use super::Source;
+use super::source::Source;
 use crate::cli::console::Console;
 use crate::cli::summary::counted;
 use crate::dataset::{Dataset, Plan};

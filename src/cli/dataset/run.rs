@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use std::sync::Mutex;
 
-use super::Source;
 use super::plan::{duration, planned, words};
+use super::source::Source;
 use crate::cli::console::{Console, say};
 use crate::cli::summary::counted;
 use crate::dataset::{Dataset, DatasetProgress, DatasetRun};
