@@ -283,7 +283,23 @@ fn what_cannot_be_is_refused_before_the_first_scan() {
         (format!("{SPEC}{posterior}"), "[[posterior]] of `aluminium`: the fit"),
         (format!("{SPEC}{posterior}fit = \"best\"\n"), "there is no fit `best`"),
         (SPEC.replace("seed = 3", "sed = 3"), "did you mean `seed`"),
-        // The plate stands beside the field of view.
+        (
+            SPEC.replace("keys = [\"radar.system_loss_db\"]", "keys = [\"mesh.plate.size_m\"]"),
+            "`mesh.plate.size_m` is drawn twice, by [[choose]] `object` and by [[vary]]",
+        ),
+        (
+            SPEC.replace(
+                "keys = [\"radar.system_loss_db\"]",
+                "keys = [\"mesh.plate.translation_m\"]",
+            ),
+            "is drawn twice, by [[place]] of `plate` and by [[vary]]",
+        ),
+        (
+            SPEC.replace("mean = 12.5", "mean = [12.5, 1]").replace("sd = 0.5", "sd = [0.5, 1]"),
+            "radar.system_loss_db=[",
+        ),
+        (SPEC.replace("test = 0.4", "test = 0.01"), "split `test`: gets none of 20 scans"),
+        // The plate stands outside the field of view.
         (
             SPEC.split("[[place]]")
                 .next()
@@ -294,7 +310,7 @@ fn what_cannot_be_is_refused_before_the_first_scan() {
                 )
                 .replace("[-0.05, 1.05, -0.15]", "[3, 1, 0]")
                 .replace("[0.05, 1.15, -0.05]", "[3, 1, 0]"),
-            "no chirp of 3 scans meets the object `plate`",
+            "no chirp of 3 scans hits the object `plate`",
         ),
     ];
     for (spec, expected) in cases {
@@ -309,9 +325,8 @@ fn what_cannot_be_is_refused_before_the_first_scan() {
     for (arguments, expected) in [
         (
             &["dataset", "shard", "ds", "5/5"][..],
-            "there is no shard 5/5: the data set has 5 shards; give K/N",
+            "there is no part 5/5; give K/N with K from 0 to N - 1",
         ),
-        (&["dataset", "shard", "ds", "0/6"], "there is no shard 0/6"),
         (&["dataset", "run", "spec.toml"], "there is no folder for its data set; give one: -o DIR"),
         (&["dataset", "run", "."], "has no plan of a data set"),
         (&["dataset", "publish", "ds"], "is not complete: shard test-00000-of-00002 is missing"),

@@ -175,7 +175,7 @@ impl Dataset {
         slf.get().make(py, None, progress.as_ref())
     }
 
-    /// Makes what is missing of one of so many equal parts.
+    /// Makes what is missing of one of several equal parts.
     ///
     /// Parameters
     /// ----------

@@ -91,7 +91,7 @@ impl Dataset {
         leaks
     }
 
-    /// Removes temporary files that nobody has written to for a while.
+    /// Removes temporary files that have not changed for a while.
     fn sweep(&self) -> u32 {
         let mut swept = 0;
         let folders =

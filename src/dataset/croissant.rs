@@ -101,7 +101,7 @@ fn fields(table: &str, columns: &[Column], source: Value) -> Vec<Value> {
             Kind::Text => "sc:Text",
             Kind::Bool => "sc:Boolean",
             Kind::Float | Kind::Double => "sc:Float",
-            Kind::Int8 | Kind::Int16 | Kind::Int32 => "sc:Integer",
+            Kind::Int8 | Kind::Int16 | Kind::Int32 | Kind::Int64 => "sc:Integer",
         };
         let unit = if unit.is_empty() { String::new() } else { format!(", {unit}") };
         let mut source = source.clone();

@@ -9,9 +9,9 @@ use toml::Value;
 use super::effect::DrawnEffect;
 use super::layout::SPEC;
 use super::posterior::DrawnMaterial;
-use super::spec::{Choice, Spec, Variation, format_error};
+use super::spec::{Choice, Numbers, Spec, Variation, format_error};
 use super::split::Split;
-use super::streams::{Kind, stream};
+use super::streams::{Kind, stream, within};
 use crate::error::Error;
 use crate::radar::random::Draws;
 use crate::scene::KeyChange;
@@ -25,6 +25,8 @@ pub(super) struct Drawn {
     pub options: BTreeMap<String, String>,
     /// Every number that was drawn, by the key that it is for.
     pub numbers: BTreeMap<String, f64>,
+    /// Every text that was drawn, by the key that it is for.
+    pub texts: BTreeMap<String, String>,
 }
 
 impl Drawn {
@@ -61,14 +63,20 @@ impl Drawn {
 
     fn vary(&mut self, variation: &Variation, draws: &mut Draws) -> Result<(), Error> {
         let Variation { keys, from, to, mean, sd, values } = variation;
-        let value = if let (Some(from), Some(to)) = (from, to) {
+        let value = if let (Some(from), Some(to), None) = (from, to, mean) {
             let ends = std::iter::zip(from.list(), to.list());
             let numbers: Vec<f64> =
                 ends.map(|(from, to)| from + (to - from) * draws.uniform()).collect();
             from.value_of(&numbers)
         } else if let (Some(mean), Some(sd)) = (mean, sd) {
-            let laws = std::iter::zip(mean.list(), sd.list());
-            let numbers: Vec<f64> = laws.map(|(mean, sd)| mean + sd * draws.gaussian()).collect();
+            let mut numbers = Vec::new();
+            for (place, (&mean, &sd)) in std::iter::zip(mean.list(), sd.list()).enumerate() {
+                let end = |ends: &Option<Numbers>, usual| {
+                    ends.as_ref().map_or(usual, |ends| ends.list()[place])
+                };
+                let ends = [end(from, f64::NEG_INFINITY), end(to, f64::INFINITY)];
+                numbers.push(within(mean, sd, ends, draws));
+            }
             mean.value_of(&numbers)
         } else {
             let place = (draws.uniform() * values.len() as f64) as usize;
@@ -88,7 +96,7 @@ impl Drawn {
         Ok(())
     }
 
-    /// Records the numbers of a value, those of a list with their places from 0.
+    /// Records a value: its numbers or its text, those of a list with their places from 0.
     fn note(&mut self, key: &str, value: &Value) {
         match value {
             Value::Float(number) => _ = self.numbers.insert(key.to_owned(), *number),
@@ -98,7 +106,10 @@ impl Drawn {
                     self.note(&format!("{key}.{place}"), value);
                 }
             }
-            _ => (),
+            other => {
+                let text = other.as_str().map_or_else(|| other.to_string(), str::to_owned);
+                self.texts.insert(key.to_owned(), text);
+            }
         }
     }
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use super::spec::{EffectDraw, Spec, refused};
-use super::streams::{Kind, stream};
+use super::streams::{Kind, stream, within};
 use crate::effects::{Level, find};
 use crate::error::Error;
 use crate::files::read_small;
@@ -64,9 +64,7 @@ impl EffectLaw {
             ));
         }
         let laws = match &draw.report {
-            Some(report) => {
-                stated(copies.get(report).map_or(Path::new(report), PathBuf::as_path), &draw.name)?
-            }
+            Some(report) => stated(report, copies.get(report), &draw.name)?,
             None => draw
                 .parameters
                 .iter()
@@ -107,9 +105,9 @@ impl EffectLaw {
         for (name, law, [min, max]) in &self.numbers {
             let value = match *law {
                 Law::Uniform([from, to]) => from + (to - from) * draws.uniform(),
-                Law::Normal { mean, sd } => mean + sd * draws.gaussian(),
+                Law::Normal { mean, sd } => within(mean, sd, [*min, *max], &mut draws),
             };
-            parameters.insert(name.clone(), value.clamp(*min, *max));
+            parameters.insert(name.clone(), value);
         }
         let entry = EffectEntry { name: self.name.clone(), source: None, parameters };
         Some(DrawnEffect { entry, level: self.level, material: self.material.clone() })
@@ -117,16 +115,15 @@ impl EffectLaw {
 }
 
 /// The numbers that a diagnosis states of an effect, by their names.
-fn stated(report: &Path, name: &str) -> Result<Vec<(String, Law)>, Error> {
-    let place = report.display();
-    let text = read_small(report)?;
+fn stated(report: &str, copy: Option<&PathBuf>, name: &str) -> Result<Vec<(String, Law)>, Error> {
+    let text = read_small(copy.map_or(Path::new(report), PathBuf::as_path))?;
     let record: Value = serde_json::from_slice(&text).map_err(|error| {
-        refused(&place, format!("is no JSON ({error})"), "name the report.json of a diagnosis")
+        refused(report, format!("is no JSON ({error})"), "name the report.json of a diagnosis")
     })?;
     let found = record["effects"].as_array().into_iter().flatten();
     let Some(effect) = found.into_iter().find(|effect| effect["name"] == name) else {
         let problem = format!("has not found the effect `{name}`");
-        return Err(refused(&place, problem, "name one that it found, or give parameters"));
+        return Err(refused(report, problem, "name one that it found, or give parameters"));
     };
     let numbers = effect["parameters"].as_object().into_iter().flatten();
     let laws: Vec<(String, Law)> = numbers
@@ -136,7 +133,7 @@ fn stated(report: &Path, name: &str) -> Result<Vec<(String, Law)>, Error> {
         })
         .collect();
     if laws.is_empty() {
-        return Err(refused(&place, "states no numbers of it", "give parameters"));
+        return Err(refused(report, "states no numbers of it", "give parameters"));
     }
     Ok(laws)
 }

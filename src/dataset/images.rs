@@ -26,7 +26,7 @@ pub(super) struct InstanceBox {
     pub bbox: Option<[u32; 4]>,
     /// Pixels that show it.
     pub pixels: u32,
-    /// Chirps whose axis meets it.
+    /// Chirps whose axis hits it.
     pub chirps: u32,
     /// Least and largest coordinates of its mesh in the global frame, m.
     pub min_m: [f64; 3],

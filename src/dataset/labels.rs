@@ -103,7 +103,7 @@ impl<'a> Labels<'a> {
         self.materials[usize::from(region)]
     }
 
-    /// What lies along every chirp's axis; none where it meets nothing.
+    /// What lies along every chirp's axis; none where it hits nothing.
     pub fn sights(&self, setup: &Setup, footprints: &Footprints) -> Vec<Option<Sight>> {
         let rays = footprints.rays_per_chirp.max(1);
         let layers: Vec<&[Option<Hit>]> = std::iter::once(&footprints.hits)

@@ -17,6 +17,8 @@ const MOST_TRIES: usize = 200;
 const MOST_LIFT_M: f64 = 0.04;
 /// How far from the surface's tangent plane what belongs to the same place may lie, m.
 const REACH_M: f64 = 0.2;
+/// How far below the tangent plane what goes over both is that of its back, m.
+const BACK_M: f64 = 0.05;
 /// Room between the mesh and what goes over it, m.
 const CLEARANCE_M: f64 = 5e-4;
 
@@ -75,8 +77,8 @@ pub(super) fn put(
         let base_m = ground_m + placing.gap_m;
         let top_m = base_m + outline.max.z - outline.min.z;
         let is_covered = over.iter().all(|mesh| {
-            let above = heights_m(mesh, &site, &outline).filter(|height_m| *height_m > 0.0);
-            above.reduce(f64::min).is_some_and(|least_m| least_m > top_m + CLEARANCE_M)
+            let front = heights_m(mesh, &site, &outline).filter(|height_m| *height_m > -BACK_M);
+            front.reduce(f64::min).is_some_and(|least_m| least_m > top_m + CLEARANCE_M)
         });
         if !is_covered {
             continue;
@@ -92,10 +94,10 @@ pub(super) fn put(
     }
     let Placing { mesh, on, under, .. } = placing;
     let (under, way_out) = match under[..] {
-        [] => (String::new(), "give a larger box, more tilt, or a smaller mesh"),
+        [] => (String::new(), "give a larger box, a larger most_tilt_deg, or a smaller mesh"),
         _ => (
             format!(" under {}", under.join(", ")),
-            "give what goes over it an offset_m above the mesh's thickness, a larger box, or a smaller mesh",
+            "give what goes over it an offset_m above the mesh's thickness, a larger box, a larger most_tilt_deg, or a smaller mesh",
         ),
     };
     Err(Error::usage(
@@ -174,29 +176,51 @@ impl Outline {
         })
     }
 
-    /// Whether a facet reaches over it or under it, by its box.
-    fn meets(&self, corners: &[DVec3; 3]) -> bool {
-        let [a, b, c] = *corners;
-        let (least, most) = (a.min(b).min(c).truncate(), a.max(b).max(c).truncate());
-        least.cmple(self.max.truncate()).all() && most.cmpge(self.min.truncate()).all()
+    /// Heights of the corners of that part of a facet that lies over or under it, m.
+    fn heights_m(&self, facet: [DVec3; 3]) -> Vec<f64> {
+        let mut corners = facet.to_vec();
+        for (axis, end, sign) in [
+            (0, self.min.x, 1.0),
+            (0, -self.max.x, -1.0),
+            (1, self.min.y, 1.0),
+            (1, -self.max.y, -1.0),
+        ] {
+            corners = cut(&corners, axis, end, sign);
+        }
+        corners.into_iter().map(|corner| corner.z).collect()
     }
 }
 
-/// Heights over the tangent plane of a site, m, of the vertices of those facets of a mesh that lie over or under what is put
-/// there. What lies far from the plane is of another part of the mesh.
+/// The part of a polygon on which `sign` times a coordinate is at least `end` (Sutherland & Hodgman 1974, DOI
+/// 10.1145/360767.360802).
+fn cut(corners: &[DVec3], axis: usize, end: f64, sign: f64) -> Vec<DVec3> {
+    let mut kept = Vec::new();
+    for (place, &corner) in corners.iter().enumerate() {
+        let next = corners[(place + 1) % corners.len()];
+        let [here, there] = [corner, next].map(|corner| sign * corner[axis] - end);
+        if here >= 0.0 {
+            kept.push(corner);
+        }
+        if (here < 0.0) != (there < 0.0) {
+            kept.push(corner.lerp(next, here / (here - there)));
+        }
+    }
+    kept
+}
+
+/// Heights over the tangent plane of a site, m, of the parts of a mesh that lie over or under what is put there. What lies
+/// far from the plane is of another part of the mesh.
 fn heights_m<'a>(
     mesh: &'a Mesh,
     site: &'a Site,
     outline: &'a Outline,
 ) -> impl Iterator<Item = f64> + 'a {
     let to_site = site.axes.transpose();
-    let corners = mesh.facets.iter().map(move |facet| {
-        facet.map(|vertex| to_site * (mesh.vertices[vertex as usize] - site.point))
+    let heights = mesh.facets.iter().flat_map(move |facet| {
+        let corners = facet.map(|at| to_site * (mesh.vertices[at as usize] - site.point));
+        outline.heights_m(corners)
     });
-    let near = corners.filter(|corners| {
-        outline.meets(corners) && corners.iter().all(|corner| corner.z.abs() <= REACH_M)
-    });
-    near.flat_map(|corners| corners.map(|corner| corner.z))
+    heights.filter(|height_m| height_m.abs() <= REACH_M)
 }
 
 /// Turns about the fixed axes x, then y, then z that make a frame, degrees.

@@ -204,17 +204,17 @@ impl Gathered {
     fn new(spec_path: &Path, store: Option<&Store>) -> Result<Gathered, Error> {
         let spec_text = String::from_utf8_lossy(&read_small(spec_path)?).into_owned();
         let spec = Spec::parse(&spec_text, spec_path)?;
-        let beside_spec = spec_path.parent().unwrap_or(Path::new(""));
+        let of_spec = spec_path.parent().unwrap_or(Path::new(""));
         let scene_path = match builtin::name(Path::new(&spec.scene)) {
             Some(_) => PathBuf::from(&spec.scene),
-            None => beside_spec.join(&spec.scene),
+            None => of_spec.join(&spec.scene),
         };
         let scene_text = read_text(&scene_path)?;
         let scene = SceneFile::parse(&scene_text);
         let scene = scene.map_err(|error| format_error(&scene_path, error))?;
-        // Files of a built-in scene's changes lie beside the specification.
-        let beside_scene = match builtin::name(&scene_path) {
-            Some(_) => beside_spec,
+        // Files of a built-in scene's changes are in the folder of the specification.
+        let of_scene = match builtin::name(&scene_path) {
+            Some(_) => of_spec,
             None => scene_path.parent().unwrap_or(Path::new("")),
         };
         let mut gathered = Gathered { files: Vec::new(), scene: scene_path.clone() };
@@ -231,8 +231,8 @@ impl Gathered {
         })?;
         gathered.add("materials", MATERIALS, text);
         let reports = spec.effect.iter().filter_map(|effect| effect.report.as_ref());
-        let of_scene = names.files.iter().map(|name| (name, beside_scene));
-        for (name, folder) in of_scene.chain(reports.map(|name| (name, beside_spec))) {
+        let named = names.files.iter().map(|name| (name, of_scene));
+        for (name, folder) in named.chain(reports.map(|name| (name, of_spec))) {
             if gathered.files.iter().any(|(input, _)| input.name == *name) {
                 continue;
             }
@@ -347,9 +347,40 @@ fn recipe(folder: &Path, inputs: &[Input], shown: &Path) -> Result<Recipe, Error
     Recipe::new(spec, [&path, shown], scene_text, meshes, materials, copies)
 }
 
+/// Refuses options that are kept apart and name files with the same bytes.
+fn check_files(recipe: &Recipe, gathered: &Gathered) -> Result<(), Error> {
+    let inputs = gathered.inputs();
+    let hashes: BTreeMap<&str, &str> =
+        inputs.iter().map(|one| (one.name.as_str(), one.blake3.as_str())).collect();
+    for choice in recipe.spec.choose.iter().filter(|choice| choice.apart) {
+        let mut known: BTreeMap<String, &str> = BTreeMap::new();
+        for option in &choice.option {
+            let set = option.set.iter().map(|(key, value)| {
+                let hash = value.as_str().and_then(|name| hashes.get(name));
+                format!(
+                    "{key}={}",
+                    hash.map_or_else(|| value.to_string(), |hash| (*hash).to_owned())
+                )
+            });
+            let set = set.collect::<Vec<_>>().join(" ");
+            if let Some(other) = known.insert(set, &option.name) {
+                return Err(Error::usage(
+                    format!(
+                        "the splits leak: options `{other}` and `{}` of [[choose]] `{}` name files with the same bytes",
+                        option.name, choice.name
+                    ),
+                    "leave one out",
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
 /// The plan of a data set, from scans that are made to try it.
 fn planned(recipe: &Recipe, gathered: &Gathered) -> Result<Plan, Error> {
     let spec = &recipe.spec;
+    check_files(recipe, gathered)?;
     let drawn = spec.scans.min(DRAWN);
     (0..drawn).into_par_iter().try_for_each(|number| {
         let scan = u64::from(number) * u64::from(spec.scans) / u64::from(drawn);
@@ -370,7 +401,7 @@ fn planned(recipe: &Recipe, gathered: &Gathered) -> Result<Plan, Error> {
         let is_seen = made.iter().any(|one| one.chirps_of_instance[place] > 0);
         if recipe.classes.objects.contains(object) && !is_seen {
             return Err(Error::usage(
-                format!("no chirp of {trials} scans meets the object `{object}`"),
+                format!("no chirp of {trials} scans hits the object `{object}`"),
                 "put it into the field of view, in front of what hides it, or leave it out of objects",
             ));
         }

@@ -53,7 +53,12 @@ enum Fill {
 type Entry = (&'static str, &'static str, &'static str, Fill);
 
 const COLUMNS: [Entry; 32] = [
-    ("scan", "", "number of the scan in its split", Fill::Int(Kind::Int32, |row, _| row.scan)),
+    (
+        "scan",
+        "",
+        "number of the scan, as in the table of scans",
+        Fill::Int(Kind::Int32, |row, _| row.scan),
+    ),
     (
         "antenna",
         "",
@@ -215,13 +220,13 @@ const COLUMNS: [Entry; 32] = [
     (
         "threat_share",
         "1",
-        "share of the spot's rays that meet an object that is looked for, behind sheets",
+        "share of the spot's rays that hit an object that is looked for, behind sheets",
         Fill::Float(|row| row.of_sight(|sight| sight.object_share.into())),
     ),
     (
         "threat",
         "",
-        "whether the axis meets such an object behind sheets",
+        "whether the axis hits such an object behind sheets",
         Fill::Bool(|row, labels| row.sight.is_some_and(|sight| labels.is_object(sight.instance))),
     ),
 ];
@@ -247,7 +252,7 @@ pub(super) struct Counts {
     pub chirps: u32,
     pub hits: u32,
     pub detections: u32,
-    /// Chirps whose axis meets an object that is looked for.
+    /// Chirps whose axis hits an object that is looked for.
     pub threat_chirps: u32,
 }
 

@@ -43,7 +43,7 @@ impl Scatter {
     /// A material without this fit, or a fit without a covariance.
     pub fn new(posterior: &Posterior, material: &Material) -> Result<Scatter, Error> {
         let Posterior { material: name, fit: wanted, .. } = posterior;
-        let place = format!("[[posterior]] of `{name}`");
+        let entry = format!("[[posterior]] of `{name}`");
         let wanted = wanted.as_ref().unwrap_or(&material.render);
         let names: Vec<&str> = material.fits.iter().map(|fit| fit.name.as_str()).collect();
         let Some(place) = names.iter().position(|known| known == wanted) else {
@@ -51,7 +51,7 @@ impl Scatter {
                 [] => "it has none: fit a curve of it, or leave the entry out".to_owned(),
                 _ => format!("there are: {}", names.join(", ")),
             };
-            return Err(refused(&place, format!("there is no fit `{wanted}`"), way_out));
+            return Err(refused(entry, format!("there is no fit `{wanted}`"), way_out));
         };
         let fit = &material.fits[place];
         let numbers = scattering_numbers(fit);
@@ -59,7 +59,7 @@ impl Scatter {
         let (Some(factor), false) = (factor, numbers.is_empty()) else {
             let problem = format!("the fit `{wanted}` has no covariance of its numbers");
             return Err(refused(
-                place,
+                entry,
                 problem,
                 "take a fit of `matdb fit`, or leave the entry out",
             ));
@@ -125,19 +125,20 @@ fn scattering_numbers(fit: &Fit) -> Vec<(usize, String, f64)> {
         let paths = fit.covariance.iter().flat_map(|covariance| &covariance.parameters).enumerate();
         return paths.map(|(place, path)| (place, path.clone(), 1.0)).collect();
     };
-    let told = report.estimates.iter().enumerate().filter(|(_, one)| one.sd.is_some());
-    told.filter_map(|(place, one)| {
-        // S is proportional to f_λ and R to r_s while k stays.
-        let path = match one.name.as_str() {
-            "S" => "specular.f_lambda",
-            "R" => "diffuse.r_s",
-            path => path,
-        };
-        let value = value_of(path)?;
-        let scale = if path == one.name { 1.0 } else { value / one.value };
-        scale.is_finite().then(|| (place, path.to_owned(), scale))
-    })
-    .collect()
+    let known = report.estimates.iter().enumerate().filter(|(_, one)| one.sd.is_some());
+    known
+        .filter_map(|(place, one)| {
+            // S is proportional to f_λ and R to r_s while k stays.
+            let path = match one.name.as_str() {
+                "S" => "specular.f_lambda",
+                "R" => "diffuse.r_s",
+                path => path,
+            };
+            let value = value_of(path)?;
+            let scale = if path == one.name { 1.0 } else { value / one.value };
+            scale.is_finite().then(|| (place, path.to_owned(), scale))
+        })
+        .collect()
 }
 
 /// The covariance of some numbers of a fit.

@@ -1,4 +1,4 @@
-//! What readers of a complete data set get beside its shards.
+//! Descriptions of a complete data set.
 
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -74,8 +74,11 @@ impl Dataset {
 /// The boxes of some scans in the form of COCO.
 fn coco(classes: &Classes, rows: &[ScanRow]) -> Value {
     let (mut images, mut annotations) = (Vec::new(), Vec::new());
-    for (image, row) in rows.iter().enumerate() {
+    let instances = classes.instances.len() as u32;
+    for row in rows {
         let Some(record) = &row.image else { continue };
+        // Unique in the whole data set, and from 1: readers take 0 for none.
+        let image = row.scan + 1;
         images.push(json!({
             "id": image,
             "file_name": format!("{}.power.exr", row.key),
@@ -85,7 +88,7 @@ fn coco(classes: &Classes, rows: &[ScanRow]) -> Value {
         for one in &record.boxes {
             let Some(bbox) = one.bbox else { continue };
             annotations.push(json!({
-                "id": annotations.len(),
+                "id": row.scan * instances + u32::from(one.instance),
                 "image_id": image,
                 "category_id": one.instance,
                 "bbox": bbox,

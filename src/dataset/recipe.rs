@@ -8,14 +8,14 @@ use super::effect::{DrawnEffect, EffectLaw};
 use super::labels::Classes;
 use super::place::{self, Put};
 use super::posterior::{DrawnMaterial, Scatter};
-use super::spec::{Spec, format_error};
+use super::spec::{EffectDraw, Spec, at, format_error, refused};
 use super::split::Split;
 use super::streams::{Kind, stream};
 use crate::effects::Level;
 use crate::error::Error;
 use crate::material::Material;
 use crate::radar::Pattern;
-use crate::scene::{GivenMaterials, GivenMeshes, Scene, SceneFile};
+use crate::scene::{GivenMaterials, GivenMeshes, KeyChange, Scene, SceneFile};
 use crate::setup::ReadyScene;
 
 /// A data set that can be made, scan by scan.
@@ -73,7 +73,25 @@ impl Recipe {
         }
         let effects = spec.effect.iter().map(|draw| EffectLaw::new(draw, &copies));
         let effects = effects.collect::<Result<Vec<_>, _>>()?;
+        for EffectDraw { name, material, .. } in &spec.effect {
+            if let Some(material) = material.as_ref().filter(|name| !materials.contains_key(*name))
+            {
+                let known: Vec<&str> = materials.keys().map(String::as_str).collect();
+                return Err(refused(
+                    format!("[[effect]] `{name}`"),
+                    format!("no region of the scene has the material `{material}`"),
+                    format!("there are: {}", known.join(", ")),
+                ));
+            }
+        }
         let splits = Split::all(&spec);
+        if let Some(empty) = splits.iter().find(|split| split.scans == 0) {
+            return Err(refused(
+                format!("split `{}`", empty.name),
+                format!("gets none of {} scans", spec.scans),
+                "make more scans, or give it a larger share",
+            ));
+        }
         let file = SceneFile::parse(&scene).map_err(|error| format_error(shown, error))?;
         let classes = Classes::new(&spec, &file, materials.keys())?;
         let [path, shown] = [path, shown].map(Path::to_owned);
@@ -114,12 +132,7 @@ impl Recipe {
     /// # Errors
     /// A scene that cannot be, by the scan's name.
     pub fn target(&self, scan: u32) -> Result<Target, Error> {
-        self.target_or(scan).map_err(|error| match error {
-            Error::Usage { problem, way_out } => {
-                Error::Usage { problem: format!("scan {}: {problem}", self.key(scan)), way_out }
-            }
-            other => other,
-        })
+        self.target_or(scan).map_err(|error| at(format!("scan {}", self.key(scan)), &error))
     }
 
     fn target_or(&self, scan: u32) -> Result<Target, Error> {
@@ -138,8 +151,7 @@ impl Recipe {
             .collect::<Result<_, _>>()?;
         drawn.note_all(&effects, &materials);
 
-        let file = SceneFile::parse_changed(&self.scene, &drawn.changes);
-        let mut file = file.map_err(|error| format_error(&self.shown, error))?;
+        let mut file = self.changed(&drawn.changes)?;
         file.name = self.key(scan);
         for entry in &mut file.mesh {
             entry.file = format!("given:{}", entry.file);
@@ -175,6 +187,19 @@ impl Recipe {
         scene.given = given;
         let ready = ReadyScene::new(scene, &self.shown, None)?;
         Ok(Target { ready, drawn, placed })
+    }
+
+    /// The scene with some changes; an error names the first that cannot be made.
+    fn changed(&self, changes: &[KeyChange]) -> Result<SceneFile, Error> {
+        SceneFile::parse_changed(&self.scene, changes).map_err(|error| {
+            let fails =
+                |count: &usize| SceneFile::parse_changed(&self.scene, &changes[..*count]).is_err();
+            let first = (1..=changes.len()).find(fails).and_then(|count| changes.get(count - 1));
+            match first {
+                Some(change) => at(change, &error),
+                None => format_error(&self.shown, error),
+            }
+        })
     }
 
     /// Name of a scan: `train-000012`.

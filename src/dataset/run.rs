@@ -59,7 +59,7 @@ pub(super) struct ShardFile {
 }
 
 impl Dataset {
-    /// Makes what is missing of the whole data set, or of one of so many equal parts (from 0), on all cores; `progress` hears
+    /// Makes what is missing of the whole data set, or of one of several equal parts (from 0), on all cores; `progress` hears
     /// of every scan. A shard is there as a whole or not at all.
     ///
     /// # Errors
@@ -99,13 +99,10 @@ impl Dataset {
     fn wanted(&self, part: Option<[u32; 2]>) -> Result<Vec<u32>, Error> {
         let all = 0..self.plan.shards;
         let Some([number, parts]) = part else { return Ok(all.collect()) };
-        if number >= parts || parts > self.plan.shards {
+        if number >= parts {
             return Err(Error::usage(
-                format!(
-                    "there is no shard {number}/{parts}: the data set has {} shards",
-                    self.plan.shards
-                ),
-                format!("give K/N with K from 0 to N - 1, and N at most {}", self.plan.shards),
+                format!("there is no part {number}/{parts}"),
+                "give K/N with K from 0 to N - 1",
             ));
         }
         Ok(all.filter(|shard| shard % parts == number).collect())
@@ -116,7 +113,7 @@ impl Dataset {
         self.recipe.split_of_shard(shard).scans_of(&self.recipe.spec, shard)
     }
 
-    /// Makes some shards, each on a thread of its own as long as there are so many.
+    /// Makes some shards, each on a thread of its own while there are enough.
     fn make_all(
         &self,
         pending: &[u32],
@@ -245,7 +242,7 @@ impl Dataset {
         wrong.map(|one| format!("has {}, which is missing or damaged", one.file))
     }
 
-    /// Refuses a disk that cannot hold so many more scans.
+    /// Refuses a disk that cannot hold more scans.
     fn check_disk(&self, scans: u32) -> Result<(), Error> {
         let needed = u64::from(scans) * self.plan.bytes_per_scan;
         match free_bytes(&self.folder) {

@@ -19,7 +19,7 @@ pub(super) struct MadeScan {
     pub points: Vec<Values>,
     /// Its images; none where the data set has none.
     pub images: Members,
-    /// For each mesh of the scene the chirps whose axis meets it.
+    /// For each mesh of the scene the chirps whose axis hits it.
     pub chirps_of_instance: Vec<u32>,
     pub record: ScanRow,
 }
@@ -30,7 +30,7 @@ pub(super) struct ScanRow {
     /// Name, unique in the data set.
     pub key: String,
     pub split: String,
-    /// Number in its split.
+    /// Number among all.
     pub scan: u32,
     /// Number of its target: the same for its repeats.
     pub target: u32,
@@ -38,6 +38,7 @@ pub(super) struct ScanRow {
     pub noise_seed: u64,
     pub options: BTreeMap<String, String>,
     pub numbers: BTreeMap<String, f64>,
+    pub texts: BTreeMap<String, String>,
     pub chirps: u32,
     pub hits: u32,
     pub detections: u32,
@@ -62,7 +63,6 @@ impl Recipe {
         views.extend(assembly.cross_polar_views(&setup, &footprints, &|_| ())?);
 
         let split = self.split_of_scan(number);
-        let scan = number - split.first;
         let of_regions = ready.material_of_region.iter();
         let materials = of_regions.map(|&place| ready.materials[usize::from(place)].name.as_str());
         let target = &ready.scene.target;
@@ -72,7 +72,7 @@ impl Recipe {
         for sight in sights.iter().flatten() {
             chirps_of_instance[usize::from(sight.instance) - 1] += 1;
         }
-        let (points, counts) = points::rows(&ready, scan, &views, &sights, &labels);
+        let (points, counts) = points::rows(&ready, number, &views, &sights, &labels);
 
         let (mut images, mut image) = (Vec::new(), None);
         if self.spec.images {
@@ -104,12 +104,13 @@ impl Recipe {
         let record = ScanRow {
             key: self.key(number),
             split: split.name.clone(),
-            scan,
+            scan: number,
             target: number / self.spec.repeats,
             seed: file.seed,
             noise_seed: file.noise_seed.unwrap_or(file.seed),
             options: drawn.options,
             numbers,
+            texts: drawn.texts,
             chirps,
             hits,
             detections,

@@ -19,13 +19,17 @@ pub(super) fn table(rows: &[(String, ScanRow)]) -> Result<Vec<u8>, Error> {
     table::write("scans", &described, [values])
 }
 
+/// A seed of a scan.
+type Seed = fn(&ScanRow) -> u64;
 /// How a column is filled from all rows.
 type Fill = Box<dyn Fn(&[(String, ScanRow)]) -> Values>;
 
 /// The columns of the table of these scans, in their order.
 pub(super) fn columns<'a>(rows: impl Iterator<Item = &'a ScanRow>) -> Vec<(Column, Fill)> {
-    let (mut options, mut numbers) = (BTreeSet::new(), BTreeSet::new());
+    let (mut options, mut numbers, mut texts_drawn) =
+        (BTreeSet::new(), BTreeSet::new(), BTreeSet::new());
     for row in rows {
+        texts_drawn.extend(row.texts.keys().cloned());
         options.extend(row.options.keys().cloned());
         numbers.extend(row.numbers.keys().cloned());
     }
@@ -48,26 +52,32 @@ pub(super) fn columns<'a>(rows: impl Iterator<Item = &'a ScanRow>) -> Vec<(Colum
             }),
         ));
     };
-    counts("scan", "number in its split", |row| row.scan);
+    counts("scan", "number of the scan, as in the tables of points", |row| row.scan);
     counts("target", "number of its target, the same for repeats", |row| row.target);
     counts("chirps", "chirps", |row| row.chirps);
-    counts("hits", "chirps whose axis meets something", |row| row.hits);
+    counts("hits", "chirps whose axis hits something", |row| row.hits);
     counts("detections", "returns of the radar at or above the threshold", |row| row.detections);
-    counts("threat_chirps", "chirps whose axis meets an object that is looked for", |row| {
+    counts("threat_chirps", "chirps whose axis hits an object that is looked for", |row| {
         row.threat_chirps
     });
+    let seeds: [(&str, &str, Seed); 2] = [
+        ("seed", "seed of the target", |row| row.seed),
+        ("noise_seed", "seed of the noise", |row| row.noise_seed),
+    ];
+    for (name, about, value) in seeds {
+        columns.push((
+            column(name, Kind::Int64, about),
+            Box::new(move |rows| {
+                Values::Longs(rows.iter().map(|(_, row)| value(row) as i64).collect())
+            }),
+        ));
+    }
     let mut doubles = |name: String, about: String, value: Box<dyn Fn(&ScanRow) -> f64>| {
         columns.push((
             Column { name, kind: Kind::Double, unit: "", about },
             Box::new(move |rows| Values::Doubles(rows.iter().map(|(_, row)| value(row)).collect())),
         ));
     };
-    doubles("seed".to_owned(), "seed of the target".to_owned(), Box::new(|row| row.seed as f64));
-    doubles(
-        "noise_seed".to_owned(),
-        "seed of the noise".to_owned(),
-        Box::new(|row| row.noise_seed as f64),
-    );
     for key in numbers {
         let about = format!(
             "what was drawn for {key}, in the unit that its name ends in; NaN where nothing was"
@@ -78,6 +88,17 @@ pub(super) fn columns<'a>(rows: impl Iterator<Item = &'a ScanRow>) -> Vec<(Colum
             about,
             Box::new(move |row| row.numbers.get(&of_row).copied().unwrap_or(f64::NAN)),
         );
+    }
+    for key in texts_drawn {
+        let column = column(&key, Kind::Text, &format!("what was drawn for {key}"));
+        columns.push((
+            column,
+            Box::new(move |rows| {
+                let texts =
+                    rows.iter().map(|(_, row)| row.texts.get(&key).cloned().unwrap_or_default());
+                Values::Texts(texts.collect())
+            }),
+        ));
     }
     for name in options {
         let about = format!("what was chosen of {name}");

@@ -2,7 +2,7 @@
 //!
 //! ```toml
 //! name = "concealed"
-//! scene = "torso.toml"          # beside this file, or builtin:NAME
+//! scene = "torso.toml"          # in the same folder, or builtin:NAME
 //! scans = 1000
 //! objects = ["plate"]           # meshes that are looked for
 //! split = { train = 0.8, test = 0.2 }
@@ -56,7 +56,7 @@ pub struct Spec {
     /// SPDX expression of its licence.
     #[serde(default)]
     pub licence: String,
-    /// The scene in which something varies: a file beside this one, or `builtin:NAME`.
+    /// The scene in which something varies: a file in the same folder, or `builtin:NAME`.
     pub scene: String,
     /// Number of scans, 1 to 10 million.
     pub scans: u32,
@@ -72,7 +72,7 @@ pub struct Spec {
     /// Most scans in one shard, which is made as a whole or not at all.
     #[serde(default = "usual_shard")]
     pub scans_per_shard: u32,
-    /// Whether there are images beside the points.
+    /// Whether there are images.
     #[serde(default = "yes")]
     pub images: bool,
     /// Shares of the scans, by the names of the splits; all are `train` unless stated.
@@ -128,7 +128,7 @@ pub struct ChoiceOption {
 pub struct Variation {
     /// Keys that all get what is drawn.
     pub keys: Vec<String>,
-    /// Lower end, a number or a list of numbers.
+    /// Lower end, a number or a list of numbers; of a normal law, too, which is drawn again beyond it.
     #[serde(default)]
     pub from: Option<Numbers>,
     /// Upper end.
@@ -206,7 +206,7 @@ pub struct EffectDraw {
     /// Ends between which each parameter is drawn, from and to; those that are not named are absent.
     #[serde(default)]
     pub parameters: BTreeMap<String, [f64; 2]>,
-    /// `report.json` of a diagnosis that found it, beside this file: parameters are drawn from what it states.
+    /// `report.json` of a diagnosis that found it, in the same folder: parameters are drawn from what it states.
     #[serde(default)]
     pub report: Option<String>,
     /// The material that has it, where it is an effect of materials.
@@ -279,6 +279,7 @@ impl Spec {
         }
         self.check_splits()?;
         self.check_choices()?;
+        self.check_keys()?;
         for variation in &self.vary {
             variation.check().map_err(|(problem, way_out)| {
                 (format!("[[vary]] of {}: {problem}", variation.keys.join(", ")), way_out)
@@ -308,6 +309,45 @@ impl Spec {
                 problem,
                 "give a [[choose]] whose options are kept apart with apart = true, or one split",
             ));
+        }
+        Ok(())
+    }
+
+    /// Refuses keys that are drawn twice: one of the draws would be recorded and have no effect.
+    fn check_keys(&self) -> Result<(), (String, &'static str)> {
+        let mut by: BTreeMap<&str, String> =
+            ["seed", "noise_seed"].map(|key| (key, "every scan".to_owned())).into();
+        let placed: Vec<[String; 2]> = self
+            .place
+            .iter()
+            .map(|one| {
+                ["rotation_deg", "translation_m"].map(|key| format!("mesh.{}.{key}", one.mesh))
+            })
+            .collect();
+        for (key, placing) in placed
+            .iter()
+            .zip(&self.place)
+            .flat_map(|(keys, one)| keys.iter().map(move |key| (key, one)))
+        {
+            by.insert(key, format!("[[place]] of `{}`", placing.mesh));
+        }
+        let of_choices = self.choose.iter().flat_map(|choice| {
+            let keys: BTreeSet<&str> = choice
+                .option
+                .iter()
+                .flat_map(|option| option.set.keys())
+                .map(|key| key.trim())
+                .collect();
+            keys.into_iter().map(move |key| (key, format!("[[choose]] `{}`", choice.name)))
+        });
+        let of_numbers = self.vary.iter().flat_map(|variation| {
+            variation.keys.iter().map(|key| (key.trim(), "[[vary]]".to_owned()))
+        });
+        for (key, entry) in of_choices.chain(of_numbers) {
+            if let Some(other) = by.insert(key, entry.clone()) {
+                let problem = format!("`{key}` is drawn twice, by {other} and by {entry}");
+                return Err((problem, "leave it out of one of them"));
+            }
         }
         Ok(())
     }
@@ -362,7 +402,8 @@ impl Spec {
 
 impl Variation {
     fn check(&self) -> Result<(), (String, &'static str)> {
-        const WAYS: &str = "give from and to, mean and sd, or values";
+        const WAYS: &str =
+            "give from and to, mean and sd (between from and to, if they are there), or values";
         if self.keys.is_empty() {
             return Err((
                 "has no keys".to_owned(),
@@ -381,16 +422,18 @@ impl Variation {
                 let problem = format!("{from:?} to {to:?} is no range");
                 Err((problem, "give as many numbers in both, the smaller ones in from"))
             }
-            (None, None, Some(mean), Some(sd), []) => {
+            (from, to, Some(mean), Some(sd), []) => {
                 let (mean, sd) = (mean.list(), sd.list());
+                let ends = [from, to].into_iter().flatten();
                 let is_law = mean.len() == sd.len()
+                    && ends.into_iter().all(|ends| ends.list().len() == mean.len())
                     && mean.iter().chain(sd).all(|number| number.is_finite())
                     && sd.iter().all(|sd| *sd >= 0.0);
                 if is_law {
                     return Ok(());
                 }
                 let problem = format!("mean {mean:?} and sd {sd:?} are no normal law");
-                Err((problem, "give as many numbers in both, sd 0 or more"))
+                Err((problem, "give as many numbers in both and in from and to, sd 0 or more"))
             }
             (None, None, None, None, [_, ..]) => Ok(()),
             _ => Err(("says not one way to draw".to_owned(), WAYS)),
@@ -475,6 +518,13 @@ pub(super) fn refused(
     way_out: impl Into<String>,
 ) -> Error {
     Error::usage(format!("{place}: {problem}"), way_out)
+}
+
+/// An error with a place in front of it.
+pub(super) fn at(place: impl Display, error: &dyn Display) -> Error {
+    let said = error.to_string();
+    let (problem, way_out) = said.rsplit_once("; ").unwrap_or((&said, "mend the specification"));
+    refused(place, problem, way_out)
 }
 
 /// The error of a file whose text cannot be taken.

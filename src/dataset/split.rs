@@ -80,7 +80,7 @@ fn per_shard(spec: &Spec) -> u32 {
     (spec.scans_per_shard / spec.repeats).max(1) * spec.repeats
 }
 
-/// So many things by their shares: the largest remainders get one more.
+/// Numbers of things by their shares: the largest remainders get one more.
 fn shared(all: u32, shares: &[f64]) -> Vec<u32> {
     let exact: Vec<f64> = shares.iter().map(|share| share * f64::from(all)).collect();
     let mut counts: Vec<u32> = exact.iter().map(|exact| exact.floor() as u32).collect();

@@ -21,3 +21,11 @@ pub(super) fn stream(seed: u64, number: u64, kind: Kind, entry: usize) -> Draws 
     let sub_ray = ((kind as u64) << 32) | entry as u64;
     Key { seed, chirp: number, sub_ray, purpose: Purpose::DataSet }.draws()
 }
+
+/// A draw of a normal law between two ends: those outside are drawn again. Where hardly any is inside it is the nearer end.
+pub(super) fn within(mean: f64, sd: f64, [low, high]: [f64; 2], draws: &mut Draws) -> f64 {
+    const MOST_TRIES: usize = 1000;
+    let drawn = (0..MOST_TRIES).map(|_| mean + sd * draws.gaussian());
+    let inside = drawn.into_iter().find(|drawn| (low..=high).contains(drawn));
+    inside.unwrap_or(mean.clamp(low, high))
+}

@@ -8,7 +8,9 @@ use parquet::basic::{
     Compression, ConvertedType, Encoding, IntType, LogicalType, Repetition, Type as Physical,
     ZstdLevel,
 };
-use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DoubleType, FloatType, Int32Type};
+use parquet::data_type::{
+    BoolType, ByteArray, ByteArrayType, DoubleType, FloatType, Int32Type, Int64Type,
+};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{WriterProperties, WriterPropertiesPtr};
@@ -34,6 +36,7 @@ pub(super) enum Kind {
     Int8,
     Int16,
     Int32,
+    Int64,
     Float,
     Double,
     Bool,
@@ -44,6 +47,7 @@ pub(super) enum Kind {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Values {
     Ints(Vec<i32>),
+    Longs(Vec<i64>),
     Floats(Vec<f32>),
     Doubles(Vec<f64>),
     Bools(Vec<bool>),
@@ -81,6 +85,9 @@ fn encoded(
                 Values::Ints(values) => {
                     column.typed::<Int32Type>().write_batch(values, None, None)?;
                 }
+                Values::Longs(values) => {
+                    column.typed::<Int64Type>().write_batch(values, None, None)?;
+                }
                 Values::Floats(values) => {
                     column.typed::<FloatType>().write_batch(values, None, None)?;
                 }
@@ -109,6 +116,7 @@ fn field(column: &Column) -> Result<Arc<Type>, ParquetError> {
         Kind::Int8 => (Physical::INT32, integer(8)),
         Kind::Int16 => (Physical::INT32, integer(16)),
         Kind::Int32 => (Physical::INT32, None),
+        Kind::Int64 => (Physical::INT64, None),
         Kind::Float => (Physical::FLOAT, None),
         Kind::Double => (Physical::DOUBLE, None),
         Kind::Bool => (Physical::BOOLEAN, None),
