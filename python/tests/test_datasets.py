@@ -869,6 +869,18 @@ def test_the_package_makes_the_bytes_of_the_command(labels):
     assert (labels.folder / "by-python" / "croissant.json").exists()
 
 
+def test_what_a_node_makes_without_a_shared_folder_is_what_is_made_here(labels, tmp_path):
+    from matdb import _ray
+
+    plan = _ray._files(labels.data, _ray.PLAN)
+    shards = len(list((labels.data / "points").iterdir()))
+    for shard in range(shards):
+        _ray._write(tmp_path, _ray._of_nothing_shared(plan, shard, shards))
+    here = bytes_of(labels.data)
+    made = bytes_of(tmp_path)
+    assert len(made) > 2 and all(here[name] == content for name, content in made.items())
+
+
 # --- What must not pass in silence --------------------------------------------------------------------------------------------------
 
 OPTIONS_APART = 'option = [{ name = "x", set = { "mesh.plate.scale" = 1.0 } }, { name = "y", set = { "mesh.plate.scale" = 1.1 } }]'
@@ -952,15 +964,6 @@ def highest_below(facets):
             polygon = np.array(kept)
         found = max(found, polygon[:, 2].max()) if len(polygon) else found
     return found
-
-
-def test_a_box_in_space_is_where_an_effect_moves_the_target(tmp_path):
-    part = 'objects = ["plate"]\n[[effect]]\nname = "pose"\nshare = 1\nparameters = { translation_z_m = [0.1, 0.1] }\n'
-    data = make(tmp_path, DRAWN_SCENE, SMALL.format(scans=1).replace("images = false\n", "") + part)
-    [files] = images_of(data).values()
-    [box] = json.loads(files["json"])["boxes"]
-    distances = points_of(data).true_range_m
-    assert distances.between(7.89, 7.91).all() and box["min_m"][2] == pytest.approx(0.1)
 
 
 def test_annotations_count_from_one(published):

@@ -30,11 +30,11 @@ pub(super) struct Drawn {
 }
 
 impl Drawn {
-    /// The options and numbers of a scan of a split.
+    /// The options and numbers of a scan of a split. Normal laws give others in each attempt.
     ///
     /// # Errors
     /// A key that is none.
-    pub fn new(spec: &Spec, split: &Split, scan: u32) -> Result<Drawn, Error> {
+    pub fn new(spec: &Spec, split: &Split, scan: u32, attempt: usize) -> Result<Drawn, Error> {
         let target = u64::from(scan / spec.repeats);
         let mut drawn = Drawn::default();
         for (entry, choice) in spec.choose.iter().enumerate() {
@@ -42,6 +42,8 @@ impl Drawn {
             drawn.choose(choice, &split.options[entry], draws.uniform())?;
         }
         for (entry, variation) in spec.vary.iter().enumerate() {
+            let attempt = if variation.mean.is_some() { attempt } else { 0 };
+            let entry = entry + (attempt << 16);
             let mut draws = stream(spec.seed, target, Kind::Variation, entry);
             drawn.vary(variation, &mut draws)?;
         }

@@ -18,6 +18,9 @@ use crate::radar::Pattern;
 use crate::scene::{GivenMaterials, GivenMeshes, KeyChange, Scene, SceneFile};
 use crate::setup::ReadyScene;
 
+/// How often the normal laws of a scan are drawn again.
+const MOST_ATTEMPTS: usize = 20;
+
 /// A data set that can be made, scan by scan.
 pub(super) struct Recipe {
     pub spec: Spec,
@@ -132,13 +135,19 @@ impl Recipe {
     /// # Errors
     /// A scene that cannot be, by the scan's name.
     pub fn target(&self, scan: u32) -> Result<Target, Error> {
-        self.target_or(scan).map_err(|error| at(format!("scan {}", self.key(scan)), &error))
+        // A normal law has no ends by itself, and may draw what no scene can have.
+        let is_normal = self.spec.vary.iter().any(|variation| variation.mean.is_some());
+        let more = if is_normal { MOST_ATTEMPTS } else { 0 };
+        let made = self.attempt(scan, 0).or_else(|error| {
+            (1..=more).find_map(|attempt| self.attempt(scan, attempt).ok()).ok_or(error)
+        });
+        made.map_err(|error| at(format!("scan {}", self.key(scan)), &error))
     }
 
-    fn target_or(&self, scan: u32) -> Result<Target, Error> {
+    fn attempt(&self, scan: u32, attempt: usize) -> Result<Target, Error> {
         let spec = &self.spec;
         let target = u64::from(scan / spec.repeats);
-        let mut drawn = Drawn::new(spec, self.split_of_scan(scan), scan)?;
+        let mut drawn = Drawn::new(spec, self.split_of_scan(scan), scan, attempt)?;
         let effects: Vec<DrawnEffect> = self
             .effects
             .iter()
