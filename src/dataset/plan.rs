@@ -13,7 +13,7 @@ use super::layout::{MATERIALS, PLAN, SCENE, SPEC};
 use super::recipe::Recipe;
 use super::scan::MadeScan;
 use super::shard::ShardFiles;
-use super::spec::{Spec, format_error};
+use super::spec::{Spec, at, format_error};
 use crate::error::Error;
 use crate::files::{Placement, read_small, read_whole, write_all};
 use crate::formats::text::{from_toml, to_toml};
@@ -293,11 +293,16 @@ impl Names {
             })
         });
         for set in sets.chain(values) {
+            let keys: Vec<String> = set.iter().map(|(key, _)| key.clone()).collect();
             let changes = set.into_iter().map(|(key, value)| KeyChange::new(&key, value));
             let changed = changes
                 .collect::<Result<Vec<_>, _>>()
                 .and_then(|changes| SceneFile::parse_changed(text, &changes));
-            names.add(&changed.map_err(|error| format_error(path, error))?);
+            names.add(
+                &changed.map_err(|error| {
+                    at(format!("{}: {}", path.display(), keys.join(", ")), &error)
+                })?,
+            );
         }
         Ok(names)
     }
