@@ -169,6 +169,16 @@ def prepare_thin_mannequins():
         thin(name, 30, 0.6)
 
 
+def prepare_data_set(scans):
+    """The data set of the pages, with fewer scans of fewer chirps."""
+    shutil.copytree(ROOT / "examples" / "datasets", "examples/datasets")
+    for name, before, after in [("torso", "rays = 16\n", "rays = 1\n[radar.scan]\nchirps = 600\nturns = 15\n"), ("concealed", "scans = 1000\n", f"scans = {scans}\n")]:
+        path = Path("examples/datasets") / f"{name}.toml"
+        text = path.read_text()
+        assert before in text
+        path.write_text(text.replace(before, after))
+
+
 PREPARED = {
     "calibrating.md": prepare_calibration,
     "own-cloud.md": prepare_thin_mannequins,
@@ -182,6 +192,8 @@ PREPARED = {
     "exchange.md": prepare_foreign_files,
     "built-in-materials.md": lambda: shutil.copytree("materials/pvdf", "pvdf"),
     "database.md": lambda: md.open().add("cotton"),
+    "data-sets.md": lambda: prepare_data_set(10),
+    "training-set.md": lambda: prepare_data_set(1000),
 }
 # The files of these pages, by the languages and the order of their blocks.
 FILES = {

@@ -130,7 +130,7 @@ mod tests {
     use super::*;
 
     fn spec(text: &str) -> Spec {
-        let options = (0..7).map(|n| format!("{{ name = \"o{n}\", set = {{ seed = {n} }} }}"));
+        let options = (0..7).map(|n| format!("{{ name = \"o{n}\", set = {{ name = \"{n}\" }} }}"));
         let options = options.collect::<Vec<_>>().join(", ");
         let text = format!(
             "name = \"s\"\nscene = \"s.toml\"\n{text}\n[[choose]]\nname = \"c\"\napart = true\noption = [{options}]\n"
