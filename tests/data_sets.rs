@@ -310,7 +310,7 @@ fn what_cannot_be_is_refused_before_the_first_scan() {
                 )
                 .replace("[-0.05, 1.05, -0.15]", "[3, 1, 0]")
                 .replace("[0.05, 1.15, -0.05]", "[3, 1, 0]"),
-            "no chirp of 3 scans hits the object `plate`",
+            "scans hits the object `plate`",
         ),
     ];
     for (spec, expected) in cases {

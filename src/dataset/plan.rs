@@ -4,7 +4,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -24,7 +23,7 @@ use crate::scene::{GivenMeshes, KeyChange, SceneFile, builtin, file_mesh, read_t
 use crate::setup::find_material;
 use crate::store::Store;
 
-/// Scans that are made for a plan, to see whether they can be, how long they take and how large they are.
+/// Least scans that are made for a plan, to see whether they can be, how long they take and how large they are.
 const TRIALS: u32 = 3;
 /// Scans that a plan draws and puts together, but does not make.
 const DRAWN: u32 = 50;
@@ -391,17 +390,19 @@ fn planned(recipe: &Recipe, gathered: &Gathered) -> Result<Plan, Error> {
         let scan = u64::from(number) * u64::from(spec.scans) / u64::from(drawn);
         recipe.target(scan as u32).map(drop)
     })?;
-    let pool = ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build()
-        .map_err(|error| Error::usage(format!("no thread can be had: {error}"), "try again"))?;
-    let trials = spec.scans.min(TRIALS);
+    // All cores at once, as when the data set is made: one alone is faster.
+    let cores = rayon::current_num_threads().max(1);
+    let trials = spec.scans.min(TRIALS.max(2 * cores as u32));
     let begun = Instant::now();
-    let made = (0..trials).map(|trial| {
-        let scan = if trial == 0 { 0 } else { (spec.scans - 1) * trial / (trials - 1).max(1) };
-        pool.install(|| recipe.make(scan))
-    });
-    let made = made.collect::<Result<Vec<MadeScan>, _>>()?;
+    let made: Vec<MadeScan> = (0..trials)
+        .into_par_iter()
+        .map(|trial| {
+            let spread =
+                u64::from(spec.scans - 1) * u64::from(trial) / u64::from(trials - 1).max(1);
+            recipe.make(spread as u32)
+        })
+        .collect::<Result<_, _>>()?;
+    let core_seconds = begun.elapsed().as_secs_f64() * cores.min(trials as usize) as f64;
     for (place, object) in recipe.classes.instances.iter().enumerate() {
         let is_seen = made.iter().any(|one| one.chirps_of_instance[place] > 0);
         if recipe.classes.objects.contains(object) && !is_seen {
@@ -413,7 +414,7 @@ fn planned(recipe: &Recipe, gathered: &Gathered) -> Result<Plan, Error> {
     }
     let first = ShardFiles::new(&made[..1])?;
     let all = ShardFiles::new(&made)?;
-    let seconds_per_scan = begun.elapsed().as_secs_f64() / f64::from(trials);
+    let seconds_per_scan = core_seconds / f64::from(trials);
     let first_scan = first.blake3();
     let mut id = blake3::Hasher::new();
     id.update(PROGRAM.as_bytes());
