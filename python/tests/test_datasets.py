@@ -860,7 +860,8 @@ def test_webdataset_reads_all_images_of_a_split(published):
 def test_the_package_makes_the_bytes_of_the_command(labels):
     import matdb as md
 
-    data = md.dataset(labels.folder / "spec.toml", labels.folder / "by-python")
+    db = md.open(labels.folder / "matdb.sqlite")
+    data = md.dataset(labels.folder / "spec.toml", labels.folder / "by-python", db=db)
     data.run()
     assert data.check()["complete"]
     by_python, by_command = bytes_of(labels.folder / "by-python"), bytes_of(labels.data)
