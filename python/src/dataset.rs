@@ -25,7 +25,7 @@ pub(crate) struct Dataset {
 
 impl Dataset {
     fn of(planned: &Planned) -> Dataset {
-        let plan = planned.plan_of();
+        let plan = planned.plan();
         Dataset {
             folder: planned.folder().to_owned(),
             name: plan.name.clone(),
@@ -86,7 +86,7 @@ pub(crate) fn dataset(
     let planned = interruptible(py, |_| -> Result<Planned, Error> {
         let store = db.map_or(Ok(None), Database::read)?;
         match &folder {
-            Some(folder) => Planned::plan(&what, folder, store.as_ref()),
+            Some(folder) => Planned::make_plan(&what, folder, store.as_ref()),
             None => Planned::open(&what),
         }
     })?;
@@ -118,7 +118,7 @@ impl Dataset {
     #[getter]
     fn plan<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let planned = py.detach(|| Planned::open(&self.folder)).map_err(raised)?;
-        to_python(py, planned.plan_of())
+        to_python(py, planned.plan())
     }
 
     fn __len__(&self) -> usize {

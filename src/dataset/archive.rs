@@ -9,7 +9,7 @@ use crate::error::Error;
 ///
 /// # Errors
 /// A name that no archive takes.
-pub(super) fn archive(scans: &[(String, Members)]) -> Result<Vec<u8>, Error> {
+pub(super) fn archive(scans: &[(&str, &Members)]) -> Result<Vec<u8>, Error> {
     write(scans).map_err(|reason| {
         Error::usage(
             format!("the images could not be put into an archive: {reason}"),
@@ -18,10 +18,10 @@ pub(super) fn archive(scans: &[(String, Members)]) -> Result<Vec<u8>, Error> {
     })
 }
 
-fn write(scans: &[(String, Members)]) -> io::Result<Vec<u8>> {
+fn write(scans: &[(&str, &Members)]) -> io::Result<Vec<u8>> {
     let mut archive = tar::Builder::new(Vec::new());
     for (key, members) in scans {
-        for (name, bytes) in members {
+        for (name, bytes) in *members {
             let mut header = tar::Header::new_ustar();
             header.set_size(bytes.len() as u64);
             header.set_mode(0o644);

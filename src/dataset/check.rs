@@ -42,15 +42,15 @@ impl Dataset {
         };
         let (mut problems, mut rows) = (Vec::new(), Vec::new());
         for shard in 0..self.plan.shards {
-            match (self.damage_of(shard), self.manifest(shard)) {
-                (None, Ok(manifest)) => {
+            match self.whole(shard) {
+                Ok(manifest) => {
                     found.done += 1;
                     found.scans += manifest.scans.len() as u32;
                     rows.extend(manifest.scans);
                 }
-                (problem, _) => {
+                Err(problem) => {
                     let name = self.recipe.split_of_shard(shard).shard_name(shard);
-                    problems.push(format!("shard {name} {}", problem.unwrap_or_default()));
+                    problems.push(format!("shard {name} {problem}"));
                 }
             }
         }

@@ -115,19 +115,6 @@ fn numbers(shown: &[Option<&Sight>], value: fn(&Sight) -> u16) -> Vec<u16> {
     shown.iter().map(|sight| sight.map_or(0, value)).collect()
 }
 
-/// The pixels, of so many from a first edge, m, whose centres are within a radius of a place.
-fn covered(
-    image: &Raster,
-    at_m: f64,
-    min_m: f64,
-    count: usize,
-    radius_m: f64,
-) -> std::ops::Range<usize> {
-    let first = ((at_m - radius_m - min_m) / image.pixel_m - 0.5).ceil().max(0.0);
-    let end = ((at_m + radius_m - min_m) / image.pixel_m + 0.5).floor().max(0.0);
-    first as usize..(end as usize).min(count)
-}
-
 /// Some channels of an image.
 fn only(image: &Raster, names: &[&str]) -> Raster {
     let Raster { width, height, x_min_m, y_min_m, pixel_m, .. } = *image;
@@ -147,17 +134,11 @@ fn nearest_sights<'a>(
     let frames = radar.frames();
     let aims = ready.scene.chirps.target_points_m(&frames);
     for (aim, sight) in aims.zip(sights) {
-        let columns = covered(image, aim.x, image.x_min_m, image.width, radius_m);
-        // Counted from below.
-        for from_below in covered(image, aim.y, image.y_min_m, image.height, radius_m) {
-            let row = image.height - 1 - from_below;
-            for column in columns.clone() {
-                let (dx, dy) = (image.x_m(column) - aim.x, image.y_m(row) - aim.y);
-                let distance_m = dx.hypot(dy);
-                let pixel = &mut nearest[row * image.width + column];
-                if distance_m <= radius_m && distance_m < pixel.0 {
-                    *pixel = (distance_m, sight.as_ref());
-                }
+        let place = aim.to_array();
+        let span = image.span_near(place, radius_m);
+        for (pixel, distance_m) in image.pixels_near(place, radius_m, span) {
+            if distance_m < nearest[pixel].0 {
+                nearest[pixel] = (distance_m, sight.as_ref());
             }
         }
     }

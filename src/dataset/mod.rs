@@ -1,6 +1,6 @@
 //! Labelled data sets: many scans of a scene in which something varies, for whoever trains a recognition.
 //!
-//! A [plan](Dataset::plan) has the specification, the scene, its meshes and its materials, so that its folder is all that
+//! A [plan](Dataset::make_plan) has the specification, the scene, its meshes and its materials, so that its folder is all that
 //! [`run`](Dataset::run) needs. A scan depends on the plan and its own number, and on nothing else: the same bytes for any number
 //! of threads, machines and interruptions. Shards are the unit of work; each is there as a whole or not at all.
 //!

@@ -11,10 +11,10 @@ use super::labels::Classes;
 use super::layout::{MATERIALS, PLAN, SCENE, SPEC};
 use super::recipe::Recipe;
 use super::scan::MadeScan;
-use super::shard::ShardFiles;
+use super::shard::{ShardFiles, write_inside};
 use super::spec::{Spec, at, format_error};
 use crate::error::Error;
-use crate::files::{Placement, read_small, read_whole, write_all};
+use crate::files::{read_small, read_whole, write_all};
 use crate::formats::text::{from_toml, to_toml};
 use crate::material::Material;
 use crate::radar::Pattern;
@@ -100,7 +100,7 @@ impl Dataset {
     /// # Errors
     /// A specification that contradicts itself or its scene, scans that cannot be made, objects that are never in view, and a
     /// folder with another plan or other files.
-    pub fn plan(spec: &Path, folder: &Path, store: Option<&Store>) -> Result<Dataset, Error> {
+    pub fn make_plan(spec: &Path, folder: &Path, store: Option<&Store>) -> Result<Dataset, Error> {
         let gathered = Gathered::new(spec, store)?;
         if folder.join(PLAN).exists() {
             let known = Dataset::open(folder)?;
@@ -116,10 +116,10 @@ impl Dataset {
         let staged = tempfile::tempdir().map_err(|reason| {
             Error::usage(format!("no temporary folder can be made: {reason}"), "set TMPDIR")
         })?;
-        gathered.write(staged.path())?;
-        let recipe = recipe(staged.path(), &gathered.inputs(), &gathered.scene)?;
+        write_inside(staged.path(), &gathered.files)?;
+        let recipe = recipe(staged.path(), &gathered.inputs, &gathered.scene)?;
         let plan = planned(&recipe, &gathered)?;
-        gathered.write(folder)?;
+        write_inside(folder, &gathered.files)?;
         write_all(folder, &[(PLAN, to_toml(&plan)?.into_bytes())])?;
         Dataset::open(folder)
     }
@@ -165,7 +165,7 @@ impl Dataset {
     }
 
     /// The plan.
-    pub fn plan_of(&self) -> &Plan {
+    pub fn plan(&self) -> &Plan {
         &self.plan
     }
 
@@ -175,14 +175,15 @@ impl Dataset {
     }
 
     fn check_same(&self, gathered: &Gathered) -> Result<(), Error> {
-        if self.plan.input == gathered.inputs() {
+        if self.plan.input == gathered.inputs {
             return Ok(());
         }
         let old: BTreeMap<&str, &str> =
             self.plan.input.iter().map(|one| (one.name.as_str(), one.blake3.as_str())).collect();
-        let inputs = gathered.inputs();
-        let other =
-            inputs.iter().find(|one| old.get(one.name.as_str()) != Some(&one.blake3.as_str()));
+        let other = gathered
+            .inputs
+            .iter()
+            .find(|one| old.get(one.name.as_str()) != Some(&one.blake3.as_str()));
         let other = other.map_or("a file".to_owned(), |one| format!("`{}`", one.name));
         Err(Error::usage(
             format!("{} has another plan: {other} differs", self.folder.display()),
@@ -193,8 +194,9 @@ impl Dataset {
 
 /// Everything that a data set is made of, read from where the specification and the scene are.
 struct Gathered {
-    /// By the names that the specification and the scene use.
-    files: Vec<(Input, Vec<u8>)>,
+    inputs: Vec<Input>,
+    /// Their paths in the folder of the plan, and their bytes.
+    files: Vec<(String, Vec<u8>)>,
     /// Where the scene is.
     scene: PathBuf,
 }
@@ -216,7 +218,8 @@ impl Gathered {
             Some(_) => of_spec,
             None => scene_path.parent().unwrap_or(Path::new("")),
         };
-        let mut gathered = Gathered { files: Vec::new(), scene: scene_path.clone() };
+        let mut gathered =
+            Gathered { inputs: Vec::new(), files: Vec::new(), scene: scene_path.clone() };
         gathered.add("specification", SPEC, spec_text.into_bytes());
         gathered.add("scene", SCENE, scene_text.clone().into_bytes());
         let names = Names::of(&spec, &scene, &scene_text, &scene_path)?;
@@ -232,7 +235,7 @@ impl Gathered {
         let reports = spec.effect.iter().filter_map(|effect| effect.report.as_ref());
         let named = names.files.iter().map(|name| (name, of_scene));
         for (name, folder) in named.chain(reports.map(|name| (name, of_spec))) {
-            if gathered.files.iter().any(|(input, _)| input.name == *name) {
+            if gathered.inputs.iter().any(|input| input.name == *name) {
                 continue;
             }
             let base = Path::new(name).file_name().unwrap_or_default().to_string_lossy();
@@ -245,26 +248,8 @@ impl Gathered {
 
     fn add(&mut self, name: &str, file: &str, bytes: Vec<u8>) {
         let blake3 = blake3::hash(&bytes).to_hex().to_string();
-        let input = Input { name: name.to_owned(), file: file.to_owned(), blake3 };
-        self.files.push((input, bytes));
-    }
-
-    fn inputs(&self) -> Vec<Input> {
-        self.files.iter().map(|(input, _)| input.clone()).collect()
-    }
-
-    /// Writes the files into a folder, all or none.
-    fn write(&self, folder: &Path) -> Result<(), Error> {
-        let (mut here, mut inside) = (Vec::new(), Vec::new());
-        for (Input { file, .. }, bytes) in &self.files {
-            match file.strip_prefix("inputs/") {
-                Some(name) => inside.push((name.to_owned(), bytes.clone())),
-                None => here.push((file.clone(), bytes.clone())),
-            }
-        }
-        let inputs = folder.join("inputs");
-        Placement::new(&[(&inputs, &inside[..]), (folder, &here[..])])?.keep();
-        Ok(())
+        self.inputs.push(Input { name: name.to_owned(), file: file.to_owned(), blake3 });
+        self.files.push((file.to_owned(), bytes));
     }
 }
 
@@ -353,9 +338,8 @@ fn recipe(folder: &Path, inputs: &[Input], shown: &Path) -> Result<Recipe, Error
 
 /// Refuses options that are kept apart and name files with the same bytes.
 fn check_files(recipe: &Recipe, gathered: &Gathered) -> Result<(), Error> {
-    let inputs = gathered.inputs();
     let hashes: BTreeMap<&str, &str> =
-        inputs.iter().map(|one| (one.name.as_str(), one.blake3.as_str())).collect();
+        gathered.inputs.iter().map(|one| (one.name.as_str(), one.blake3.as_str())).collect();
     for choice in recipe.spec.choose.iter().filter(|choice| choice.apart) {
         let mut known: BTreeMap<String, &str> = BTreeMap::new();
         for option in &choice.option {
@@ -419,7 +403,7 @@ fn planned(recipe: &Recipe, gathered: &Gathered) -> Result<Plan, Error> {
     let mut id = blake3::Hasher::new();
     id.update(PROGRAM.as_bytes());
     id.update(first_scan.as_bytes());
-    gathered.files.iter().for_each(|(input, _)| _ = id.update(input.blake3.as_bytes()));
+    gathered.inputs.iter().for_each(|input| _ = id.update(input.blake3.as_bytes()));
     let split = recipe.splits.iter().map(|split| PlannedSplit {
         name: split.name.clone(),
         scans: split.scans,
@@ -437,6 +421,6 @@ fn planned(recipe: &Recipe, gathered: &Gathered) -> Result<Plan, Error> {
         bytes_per_scan: all.bytes() / u64::from(trials),
         classes: recipe.classes.clone(),
         split: split.collect(),
-        input: gathered.inputs(),
+        input: gathered.inputs.clone(),
     })
 }

@@ -37,14 +37,7 @@ impl Dataset {
                 "`matdb dataset run` makes what is missing",
             ));
         }
-        let mut rows: Vec<(String, Vec<ScanRow>)> = Vec::new();
-        for shard in 0..self.plan.shards {
-            let name = self.recipe.split_of_shard(shard).shard_name(shard);
-            let manifest = self.manifest(shard).map_err(|problem| {
-                Error::usage(format!("the shard {name} {problem}"), "run it again")
-            })?;
-            rows.push((name, manifest.scans));
-        }
+        let rows = self.rows()?;
         let columns = scans::columns(rows.iter().flat_map(|(_, rows)| rows));
         let columns: Vec<_> = columns.into_iter().map(|(column, _)| column).collect();
         let table = read_whole(&self.folder.join(SCANS))?;

@@ -62,29 +62,14 @@ impl Recipe {
     ) -> Result<Recipe, Error> {
         let mut scatters = Vec::new();
         for posterior in &spec.posterior {
-            let Some(material) = materials.get(&posterior.material) else {
-                let known: Vec<&str> = materials.keys().map(String::as_str).collect();
-                return Err(Error::usage(
-                    format!(
-                        "[[posterior]]: no region of the scene has the material `{}`",
-                        posterior.material
-                    ),
-                    format!("there are: {}", known.join(", ")),
-                ));
-            };
+            let material = material_of(&materials, &posterior.material, "[[posterior]]")?;
             scatters.push(Scatter::new(posterior, material)?);
         }
         let effects = spec.effect.iter().map(|draw| EffectLaw::new(draw, &copies));
         let effects = effects.collect::<Result<Vec<_>, _>>()?;
         for EffectDraw { name, material, .. } in &spec.effect {
-            if let Some(material) = material.as_ref().filter(|name| !materials.contains_key(*name))
-            {
-                let known: Vec<&str> = materials.keys().map(String::as_str).collect();
-                return Err(refused(
-                    format!("[[effect]] `{name}`"),
-                    format!("no region of the scene has the material `{material}`"),
-                    format!("there are: {}", known.join(", ")),
-                ));
+            if let Some(material) = material {
+                material_of(&materials, material, &format!("[[effect]] `{name}`"))?;
             }
         }
         let splits = Split::all(&spec);
@@ -216,4 +201,17 @@ impl Recipe {
         let split = self.split_of_scan(scan);
         format!("{}-{:06}", split.name, scan - split.first)
     }
+}
+
+/// The material of a scene that an entry of a specification names.
+fn material_of<'a>(
+    materials: &'a BTreeMap<String, Material>,
+    name: &str,
+    entry: &str,
+) -> Result<&'a Material, Error> {
+    materials.get(name).ok_or_else(|| {
+        let known: Vec<&str> = materials.keys().map(String::as_str).collect();
+        let problem = format!("no region of the scene has the material `{name}`");
+        refused(entry, problem, format!("there are: {}", known.join(", ")))
+    })
 }

@@ -13,9 +13,9 @@ use super::layout;
 use super::plan::Dataset;
 use super::scan::ScanRow;
 use super::scans;
-use super::shard::ShardFiles;
+use super::shard::{ShardFiles, write_inside};
 use crate::error::Error;
-use crate::files::{Placement, read_whole};
+use crate::files::read_whole;
 
 /// How far the making of a data set has come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,7 +72,7 @@ impl Dataset {
     ) -> Result<DatasetRun, Error> {
         let wanted = self.wanted(part)?;
         let pending: Vec<u32> =
-            wanted.into_iter().filter(|&shard| self.damage_of(shard).is_some()).collect();
+            wanted.into_iter().filter(|&shard| self.whole(shard).is_err()).collect();
         let of: u32 = pending.iter().map(|&shard| self.scans_of(shard).len() as u32).sum();
         let mut made = DatasetRun::default();
         if !pending.is_empty() {
@@ -92,7 +92,7 @@ impl Dataset {
 
     /// The shards that are not there as a whole.
     pub fn missing(&self) -> Vec<u32> {
-        (0..self.plan.shards).filter(|&shard| self.damage_of(shard).is_some()).collect()
+        (0..self.plan.shards).filter(|&shard| self.whole(shard).is_err()).collect()
     }
 
     /// The shards of a part.
@@ -202,15 +202,9 @@ impl Dataset {
         self.write(&[(layout::manifest(&name), text)])
     }
 
-    /// Writes files, by their paths in the folder.
+    /// Writes files, by their paths in the folder: all of them, or none.
     pub(super) fn write(&self, files: &[(String, Vec<u8>)]) -> Result<(), Error> {
-        for (path, bytes) in files {
-            let path = self.folder.join(path);
-            let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else { continue };
-            let file = [(name.to_string_lossy(), bytes.clone())];
-            Placement::new(&[(folder, &file[..])])?.keep();
-        }
-        Ok(())
+        write_inside(&self.folder, files)
     }
 
     /// What a shard says of itself.
@@ -229,17 +223,29 @@ impl Dataset {
         Ok(manifest)
     }
 
-    /// What is wrong with a shard; none where it is there as a whole.
-    pub(super) fn damage_of(&self, shard: u32) -> Option<String> {
-        let manifest = match self.manifest(shard) {
-            Ok(manifest) => manifest,
-            Err(problem) => return Some(problem),
-        };
-        let wrong = manifest
-            .files
-            .iter()
-            .find(|one| hash_of(&self.folder.join(&one.file)) != Some(one.blake3.clone()));
-        wrong.map(|one| format!("has {}, which is missing or damaged", one.file))
+    /// What a shard says of itself, if all of its files are there and sound; else what is wrong.
+    pub(super) fn whole(&self, shard: u32) -> Result<Manifest, String> {
+        let manifest = self.manifest(shard)?;
+        let is_damaged =
+            |one: &&ShardFile| hash_of(&self.folder.join(&one.file)).as_ref() != Some(&one.blake3);
+        match manifest.files.iter().find(is_damaged) {
+            Some(one) => Err(format!("has {}, which is missing or damaged", one.file)),
+            None => Ok(manifest),
+        }
+    }
+
+    /// The names of all shards, each with the rows of its scans.
+    pub(super) fn rows(&self) -> Result<Vec<(String, Vec<ScanRow>)>, Error> {
+        let rows = (0..self.plan.shards).map(|shard| {
+            let name = self.recipe.split_of_shard(shard).shard_name(shard);
+            match self.manifest(shard) {
+                Ok(manifest) => Ok((name, manifest.scans)),
+                Err(problem) => {
+                    Err(Error::usage(format!("the shard {name} {problem}"), "run it again"))
+                }
+            }
+        });
+        rows.collect()
     }
 
     /// Refuses a disk that cannot hold more scans.
@@ -274,14 +280,11 @@ impl Dataset {
 
     /// Writes the table of all scans, once all are there.
     fn finish(&self) -> Result<(), Error> {
-        let mut rows = Vec::new();
-        for shard in 0..self.plan.shards {
-            let name = self.recipe.split_of_shard(shard).shard_name(shard);
-            let manifest = self.manifest(shard).map_err(|problem| {
-                Error::usage(format!("the shard {name} {problem}"), "run it again")
-            })?;
-            rows.extend(manifest.scans.into_iter().map(|row| (name.clone(), row)));
-        }
+        let rows = self
+            .rows()?
+            .into_iter()
+            .flat_map(|(shard, rows)| rows.into_iter().map(move |row| (shard.clone(), row)));
+        let rows: Vec<scans::Row> = rows.collect();
         self.write(&[(layout::SCANS.to_owned(), scans::table(&rows)?)])
     }
 }

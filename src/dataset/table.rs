@@ -58,20 +58,20 @@ pub(super) enum Values {
 ///
 /// # Errors
 /// When a group lacks a column.
-pub(super) fn write(
+pub(super) fn write<'a>(
     name: &str,
     columns: &[Column],
-    groups: impl IntoIterator<Item = Vec<Values>>,
+    groups: impl IntoIterator<Item = &'a [Values]>,
 ) -> Result<Vec<u8>, Error> {
     encoded(name, columns, groups).map_err(|error| {
         Error::usage(format!("a table could not be encoded: {error}"), "report this")
     })
 }
 
-fn encoded(
+fn encoded<'a>(
     name: &str,
     columns: &[Column],
-    groups: impl IntoIterator<Item = Vec<Values>>,
+    groups: impl IntoIterator<Item = &'a [Values]>,
 ) -> Result<Vec<u8>, ParquetError> {
     let fields = columns.iter().map(field).collect::<Result<_, _>>()?;
     let schema = Arc::new(Type::group_type_builder(name).with_fields(fields).build()?);
@@ -79,7 +79,7 @@ fn encoded(
     let mut writer = SerializedFileWriter::new(&mut bytes, schema, properties(columns)?)?;
     for values in groups {
         let mut group = writer.next_row_group()?;
-        for values in &values {
+        for values in values {
             let Some(mut column) = group.next_column()? else { break };
             match values {
                 Values::Ints(values) => {

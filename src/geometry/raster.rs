@@ -42,6 +42,36 @@ impl Raster {
         self.y_min_m + ((self.height - row) as f64 - 0.5) * self.pixel_m
     }
 
+    /// The rows and columns in which pixels may have their centres within a distance of a place, m.
+    pub fn span_near(&self, [x_m, y_m]: [f64; 2], distance_m: f64) -> [Range<usize>; 2] {
+        let [columns, from_below] =
+            [(x_m, self.x_min_m, self.width), (y_m, self.y_min_m, self.height)].map(
+                |(centre_m, min_m, count)| {
+                    let first =
+                        ((centre_m - distance_m - min_m) / self.pixel_m - 0.5).ceil().max(0.0);
+                    let end = ((centre_m + distance_m - min_m) / self.pixel_m + 0.5).floor();
+                    // The conversion to integers saturates: a place outside the grid gives an empty span.
+                    (first as usize).min(count)..(end as usize).min(count)
+                },
+            );
+        [self.height - from_below.end..self.height - from_below.start, columns]
+    }
+
+    /// The pixels in some rows and columns whose centres are within a distance of a place, with their distances, m.
+    pub fn pixels_near(
+        &self,
+        [x_m, y_m]: [f64; 2],
+        distance_m: f64,
+        [rows, columns]: [Range<usize>; 2],
+    ) -> impl Iterator<Item = (usize, f64)> {
+        rows.flat_map(move |row| {
+            columns.clone().filter_map(move |column| {
+                let pixel_m = (self.x_m(column) - x_m).hypot(self.y_m(row) - y_m);
+                (pixel_m <= distance_m).then_some((row * self.width + column, pixel_m))
+            })
+        })
+    }
+
     /// Whether a point lies on the grid, m.
     pub fn contains(&self, x_m: f64, y_m: f64) -> bool {
         let within = |at_m: f64, min_m: f64, pixels: usize| {

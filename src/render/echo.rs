@@ -121,14 +121,14 @@ impl Echoes<'_> {
             power_w: seen.map_or(0.0, |seen| seen.power_w),
             phase_rad,
             rank: 1,
-            truth: cause.map(|path| Truth {
-                mean_power_w: paths.iter().filter(&near).map(|path| path.power_w).sum(),
-                ..self.truth(chirp, hits, path)
+            truth: cause.map(|path| {
+                let mean_power_w = paths.iter().filter(&near).map(|path| path.power_w).sum();
+                self.truth(chirp, hits, path, mean_power_w)
             }),
         })
     }
 
-    fn truth(&self, chirp: usize, hits: &[Option<Hit>], path: &Path) -> Truth {
+    fn truth(&self, chirp: usize, hits: &[Option<Hit>], path: &Path, mean_power_w: f64) -> Truth {
         // What lies behind sheets has hits of its own.
         let behind = usize::from(path.sheets).checked_sub(1);
         let behind = behind.map(|number| &self.footprints.behind[number]);
@@ -137,7 +137,7 @@ impl Echoes<'_> {
         let edge_m = behind.map_or(&self.footprints.edge_m, |behind| &behind.edge_m);
         Truth {
             hit: path.hit,
-            mean_power_w: path.power_w,
+            mean_power_w,
             region: self.setup.geometry.region_of_facet[path.hit.facet as usize],
             theta_sd_rad: theta_sd_rad(hits),
             sheets: path.sheets,

@@ -107,21 +107,14 @@ fn by_bands<'a, 'e>(splats: &'a [Splat<'e>], band_rows: usize) -> [Vec<&'a Splat
 
 impl<'a> Splat<'a> {
     fn new(echo: &'a Echo, raster: &Raster, spot_m: f64, material_of_region: &[u16]) -> Splat<'a> {
-        let radius_m = spot_m / 2.0;
-        let span = |centre_m: f64, min_m: f64, count: usize| {
-            let first = ((centre_m - radius_m - min_m) / raster.pixel_m - 0.5).ceil().max(0.0);
-            let end = ((centre_m + radius_m - min_m) / raster.pixel_m + 0.5).floor();
-            // The conversion to integers saturates: a detection outside the grid gives an empty span.
-            (first as usize).min(count)..(end as usize).min(count)
-        };
-        let from_below = span(echo.yt_m, raster.y_min_m, raster.height);
+        let [rows, columns] = raster.span_near([echo.xt_m, echo.yt_m], spot_m / 2.0);
         Splat {
             echo,
             power_w: echo.power_w,
             incidence_rad: echo.truth.map(|truth| truth.hit.theta_rad()),
             material: echo.truth.map(|truth| material_of_region[usize::from(truth.region)]),
-            columns: span(echo.xt_m, raster.x_min_m, raster.width),
-            rows: raster.height - from_below.end..raster.height - from_below.start,
+            columns,
+            rows,
         }
     }
 
@@ -132,16 +125,9 @@ impl<'a> Splat<'a> {
         spot_m: f64,
         rows: Range<usize>,
     ) -> impl Iterator<Item = (usize, f64)> {
-        let radius_m = spot_m / 2.0;
         let rows = self.rows.start.max(rows.start)..self.rows.end.min(rows.end);
-        rows.flat_map(move |row| {
-            self.columns.clone().filter_map(move |column| {
-                let dx = raster.x_m(column) - self.echo.xt_m;
-                let dy = raster.y_m(row) - self.echo.yt_m;
-                let distance_m = dx.hypot(dy);
-                (distance_m <= radius_m).then_some((row * raster.width + column, distance_m))
-            })
-        })
+        let place = [self.echo.xt_m, self.echo.yt_m];
+        raster.pixels_near(place, spot_m / 2.0, [rows, self.columns.clone()])
     }
 }
 

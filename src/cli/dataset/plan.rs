@@ -21,20 +21,20 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let dataset = planned(&args.source, db, console)?;
-    console.result(&words(&dataset), dataset.plan_of())
+    console.result(&words(&dataset), dataset.plan())
 }
 
 /// Plans, or opens the plan that is there.
 pub(super) fn planned(source: &Source, db: &Database, console: &Console) -> Result<Dataset, Error> {
     let activity = console.activity("plan");
-    let dataset = Dataset::plan(&source.spec, &source.output, db.read()?.as_ref());
+    let dataset = Dataset::make_plan(&source.spec, &source.output, db.read()?.as_ref());
     activity.end();
     dataset
 }
 
 /// What a plan will take.
 pub(super) fn words(dataset: &Dataset) -> String {
-    let Plan { scans, shards, seconds_per_scan, bytes_per_scan, split, .. } = dataset.plan_of();
+    let Plan { scans, shards, seconds_per_scan, bytes_per_scan, split, .. } = dataset.plan();
     let splits = split.iter().map(|one| format!("{} {}", grouped(one.scans as usize), one.name));
     let splits: Vec<String> = splits.collect();
     let cores = rayon::current_num_threads();

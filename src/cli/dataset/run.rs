@@ -1,9 +1,7 @@
 //! `matdb dataset run` and `matdb dataset shard`.
 
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
-
-use std::sync::Mutex;
+use std::time::Instant;
 
 use super::plan::{duration, planned, words};
 use super::source::Source;
@@ -77,25 +75,15 @@ fn make(dataset: &Dataset, part: Option<[u32; 2]>, console: &Console) -> Result<
     if !console.quiet {
         say(words(dataset).trim_end());
     }
-    let bar = console.progress("scans", 0);
-    let (begun, last) = (Instant::now(), Mutex::new(Instant::now()));
+    let (begun, activity) = (Instant::now(), console.activity("scans"));
     let made = dataset.run(part, &|DatasetProgress { done, of }| {
-        bar.set_length(of.into());
-        bar.set_position(done.into());
-        // Off a terminal, a line every ten seconds.
-        let mut last = last.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        if bar.is_hidden()
-            && !console.quiet
-            && done > 0
-            && last.elapsed() >= Duration::from_secs(10)
-        {
-            *last = Instant::now();
+        if done > 0 {
             let rate = f64::from(done) / begun.elapsed().as_secs_f64();
             let left = duration(f64::from(of - done) / rate);
-            say(&format!("scans: {done} of {of}, {rate:.1} a second, {left} to go"));
+            activity.now(&format!("{done} of {of}, {rate:.1} a second, {left} to go"));
         }
     });
-    bar.finish_and_clear();
+    activity.end();
     let made = made?;
     console.result(&result(dataset, &made, begun), &made)
 }
