@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 from statistics import NormalDist
 from types import SimpleNamespace
+from xml.etree import ElementTree
 
 import numpy as np
 import pandas as pd
@@ -412,6 +413,17 @@ def test_published_boxes_are_those_of_the_images(published):
     boxes = [(key, box) for key, files in images.items() for box in json.loads(files["json"])["boxes"]]
     expected = {(key, box["name"], *box["bbox"]) for key, box in boxes if box["bbox"]}
     assert found == expected and len(found) > 4
+    in_voc = set()
+    for path in published.data.rglob("voc/*.tar"):
+        with tarfile.open(path) as archive:
+            for name in archive.getnames():
+                document = ElementTree.parse(archive.extractfile(name)).getroot()
+                assert document.findtext("filename") == name.removesuffix(".xml") + ".power.exr"
+                for one in document.iter("object"):
+                    left, top, right, bottom = (int(one.findtext(f"bndbox/{side}")) for side in ("xmin", "ymin", "xmax", "ymax"))
+                    box = (left - 1, top - 1, right - left + 1, bottom - top + 1)
+                    in_voc.add((name.removesuffix(".xml"), one.findtext("name"), *box))
+    assert in_voc == expected
 
 
 # --- Places -----------------------------------------------------------------------------------------------------------------------

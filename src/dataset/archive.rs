@@ -1,5 +1,6 @@
-//! Images of several scans in one archive, as WebDataset takes them: members of a scan follow each other and have its key.
+//! Files of several scans in one archive, as WebDataset takes them: members of a scan follow each other and have its key.
 
+use std::borrow::Borrow;
 use std::io;
 
 use super::images::Members;
@@ -9,19 +10,19 @@ use crate::error::Error;
 ///
 /// # Errors
 /// A name that no archive takes.
-pub(super) fn archive(scans: &[(&str, &Members)]) -> Result<Vec<u8>, Error> {
+pub(super) fn archive(scans: &[(&str, impl Borrow<Members>)]) -> Result<Vec<u8>, Error> {
     write(scans).map_err(|reason| {
         Error::usage(
-            format!("the images could not be put into an archive: {reason}"),
+            format!("the files of some scans could not be put into an archive: {reason}"),
             "report this",
         )
     })
 }
 
-fn write(scans: &[(&str, &Members)]) -> io::Result<Vec<u8>> {
+fn write(scans: &[(&str, impl Borrow<Members>)]) -> io::Result<Vec<u8>> {
     let mut archive = tar::Builder::new(Vec::new());
     for (key, members) in scans {
-        for (name, bytes) in *members {
+        for (name, bytes) in members.borrow() {
             let mut header = tar::Header::new_ustar();
             header.set_size(bytes.len() as u64);
             header.set_mode(0o644);

@@ -41,7 +41,7 @@ pub(super) fn card(dataset: &Dataset, columns: &[Column]) -> String {
         text += "| `images/SHARD.tar` | images of each scan as WebDataset: `KEY.power.exr` (dBm) and `KEY.range.exr` (m) as measured, \
                  `KEY.truth.exr` (depth in m and incidence in degrees), `KEY.instance.png` and `KEY.material.png` (16 bit; 0 for \
                  nothing, material numbers plus 1), `KEY.json` (grid and boxes) |\n\
-                 | `coco/SHARD.json` | the boxes in the form of COCO |\n";
+                 | `coco/SHARD.json`, `voc/SHARD.tar` | the boxes in the forms of COCO and of Pascal VOC |\n";
     }
     text += "| `manifests/SHARD.json` | hashes (BLAKE3) of a shard's files, and what was drawn |\n\
              | `plan.toml`, `spec.toml`, `inputs/` | everything that it is made of |\n\n";

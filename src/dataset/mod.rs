@@ -7,6 +7,7 @@
 //! The order of the modules: what is drawn, where it is put, what is labelled, what is written.
 
 mod archive;
+mod boxes;
 mod card;
 mod check;
 mod croissant;

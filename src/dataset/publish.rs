@@ -1,14 +1,14 @@
 //! Descriptions of a complete data set.
 
 use serde::Serialize;
-use serde_json::{Value, json};
+use serde_json::Value;
 
+use super::archive::archive;
+use super::boxes;
 use super::card::card;
 use super::croissant;
-use super::labels::Classes;
 use super::layout::SCANS;
 use super::plan::Dataset;
-use super::scan::ScanRow;
 use super::scans;
 use crate::error::Error;
 use crate::files::read_whole;
@@ -25,7 +25,7 @@ pub struct DatasetPublication {
 }
 
 impl Dataset {
-    /// Writes `croissant.json`, the page `README.md`, and the boxes of each shard in the form of COCO.
+    /// Writes `croissant.json`, the page `README.md`, and the boxes of each shard in the forms of COCO and of Pascal VOC.
     ///
     /// # Errors
     /// A data set that is not complete and sound; files that cannot be written.
@@ -48,7 +48,9 @@ impl Dataset {
         ];
         if self.recipe.spec.images {
             for (name, rows) in &rows {
-                files.push((format!("coco/{name}.json"), pretty(&coco(&self.plan.classes, rows))));
+                let coco = boxes::coco(&self.plan.classes, rows);
+                files.push((format!("coco/{name}.json"), pretty(&coco)));
+                files.push((format!("voc/{name}.tar"), archive(&boxes::voc(rows))?));
             }
         }
         self.write(&files)?;
@@ -62,39 +64,6 @@ impl Dataset {
         }
         Ok(published)
     }
-}
-
-/// The boxes of some scans in the form of COCO.
-fn coco(classes: &Classes, rows: &[ScanRow]) -> Value {
-    let (mut images, mut annotations) = (Vec::new(), Vec::new());
-    let instances = classes.instances.len() as u32;
-    for row in rows {
-        let Some(record) = &row.image else { continue };
-        // Unique in the whole data set, and from 1: readers take 0 for none.
-        let image = row.scan + 1;
-        images.push(json!({
-            "id": image,
-            "file_name": format!("{}.power.exr", row.key),
-            "width": record.width,
-            "height": record.height,
-        }));
-        for one in &record.boxes {
-            let Some(bbox) = one.bbox else { continue };
-            annotations.push(json!({
-                "id": row.scan * instances + u32::from(one.instance),
-                "image_id": image,
-                "category_id": one.instance,
-                "bbox": bbox,
-                "area": one.pixels,
-                "iscrowd": 0,
-            }));
-        }
-    }
-    let categories = (1u16..).zip(&classes.instances).map(|(id, name)| {
-        let kind = if classes.objects.contains(name) { "object" } else { "surroundings" };
-        json!({"id": id, "name": name, "supercategory": kind})
-    });
-    json!({"images": images, "annotations": annotations, "categories": categories.collect::<Vec<_>>()})
 }
 
 fn pretty(value: &Value) -> Vec<u8> {

@@ -25,6 +25,7 @@ pub mod points;
 pub mod stl;
 pub mod text;
 pub mod words;
+pub mod xml;
 
 pub use columns::ColumnNames;
 pub use effect::EffectEntry;

@@ -14,6 +14,7 @@ use thiserror::Error;
 use tiny_skia::{FillRule, Paint, Path, PathBuilder, PathSegment, Pixmap, Stroke, Transform};
 
 use crate::formats::base64::base64;
+use crate::formats::xml::escaped;
 
 /// Pixels per metre of paper written into the PNG: 200 per inch.
 const PIXELS_PER_M: u32 = 7874;
@@ -481,20 +482,9 @@ fn hex([red, green, blue]: Rgb) -> String {
     format!("#{red:02x}{green:02x}{blue:02x}")
 }
 
-/// Text that XML can hold, in an attribute too: its signs spelled out, control characters as blanks.
-pub(super) fn escaped(text: &str) -> String {
-    let clean = text.replace(char::is_control, " ");
-    clean.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn svg_text_is_escaped() {
-        assert_eq!(escaped("a<b & \"c\">d\u{0}"), "a&lt;b &amp; &quot;c&quot;&gt;d ");
-    }
 
     #[test]
     fn longer_text_is_wider_and_scales() {

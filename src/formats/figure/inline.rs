@@ -4,9 +4,10 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use super::axes::Axes;
-use super::drawing::{Point, escaped};
+use super::drawing::Point;
 use super::error::FigureError;
 use super::plot::{Plot, Style, Trace};
+use crate::formats::xml::escaped;
 
 const WIDTH: f32 = 720.0;
 const HEIGHT: f32 = 420.0;
