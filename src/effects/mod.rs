@@ -53,6 +53,7 @@ pub use place::Place;
 pub(crate) use range_cell::RangeCell;
 pub(crate) use receiver::MOST_LOOKS;
 pub use receiver::Receiver;
+pub(crate) use shot::mean;
 pub use shot::{Shot, Stage, middle};
 pub use tilt::tilted_cos_theta;
 pub use twist::Twist;

@@ -443,6 +443,11 @@ impl Model<'_> {
             .collect()
     }
 
+    /// Whether an effect moves the target.
+    pub(crate) fn moves_target(&self) -> bool {
+        self.effects.iter().any(|(effect, _)| effect.moves())
+    }
+
     /// The pose of the target at a shot by the effects; `None` if none moves it.
     pub(crate) fn target(&self, stage: &Stage, shot: &Shot) -> Option<Pose<Global, Global>> {
         let motions = self.effects.iter().filter(|(effect, _)| effect.moves());
@@ -557,6 +562,15 @@ impl Model<'_> {
             effect.multiply_gains(values, stage, &shots, &mut gains);
         }
         gains
+    }
+
+    /// The product of all gains of a shot, whose law gives `f_per_sr` without effects; `None` where effects change that.
+    pub(crate) fn gain_alone(&self, stage: &Stage, shot: &Shot, f_per_sr: f64) -> Option<f64> {
+        let law = self.laws.get(usize::from(shot.region))?;
+        let is_left = |(effect, values): &(&dyn Effect, Vec<f64>)| {
+            effect.scatter(values, stage, law, shot, f_per_sr) == f_per_sr
+        };
+        self.effects.iter().all(is_left).then(|| self.gain(stage, shot))
     }
 
     /// The product of all gains of a shot.

@@ -154,6 +154,14 @@ pub(super) fn returns_wave(law: &Brdf, beam_rad: f64) -> bool {
 
 /// Mean of the intersections of the shots, m, global frame; the origin without shots.
 pub fn middle(shots: &[Shot]) -> DVec3 {
-    let sum: DVec3 = shots.iter().map(|shot| shot.hit.point.xyz).sum();
-    sum / shots.len().max(1) as f64
+    mean(shots.iter().map(|shot| shot.hit.point.xyz))
+}
+
+/// Mean of some points; the origin without points.
+pub(crate) fn mean(points: impl Iterator<Item = DVec3>) -> DVec3 {
+    let (mut sum, mut count) = (DVec3::ZERO, 0.0_f64);
+    for point in points {
+        (sum, count) = (sum + point, count + 1.0);
+    }
+    sum / count.max(1.0)
 }

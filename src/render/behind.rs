@@ -14,29 +14,22 @@ use crate::trace::{Hit, ScanGeometry};
 /// the rounding of f64 and far below a wavelength.
 pub(super) const LIFT_M: f64 = 1e-7;
 
+/// Rays that go on together: those of a spot nearly coincide.
+const RAYS_PER_TASK: usize = 64;
+
 /// Adds to the footprints what lies behind the sheets that their rays meet.
 pub(super) fn trace_behind(setup: &Setup, footprints: &mut Footprints) {
     let geometry = &setup.geometry;
     let count = footprints.rays_per_chirp;
     let rays = SpotRays::new(geometry, &*footprints);
+    let chirps = (RAYS_PER_TASK / count).max(1);
     for _ in 0..setup.most_sheets {
         let front = footprints.behind.last().map_or(&footprints.hits, |behind| &behind.hits);
-        let through: Vec<(usize, Hit, Ray<Global>)> = front
-            .par_iter()
-            .enumerate()
-            .filter_map(|(number, hit)| {
-                let hit = (*hit)?;
-                setup.sheet(hit.facet)?;
-                Some((number, hit, onward(&hit, rays.direction(number)?)))
-            })
-            .collect();
-        let onward: Vec<Ray<Global>> = through.iter().map(|(.., ray)| *ray).collect();
         let mut hits = vec![None; front.len()];
-        for ((number, front, _), hit) in through.iter().zip(geometry.bvh.closest_of_each(&onward)) {
-            let from_radar =
-                |hit: Hit| Hit { range_m: front.range_m + LIFT_M + hit.range_m, ..hit };
-            hits[*number] = hit.map(from_radar);
-        }
+        let tasks = hits.par_chunks_mut(chirps * count).zip(front.par_chunks(chirps * count));
+        tasks.enumerate().for_each(|(task, (hits, front))| {
+            rays.meet_behind(setup, task * chirps, front, hits);
+        });
         if hits.iter().all(Option::is_none) {
             return;
         }
@@ -82,10 +75,40 @@ impl<'a> SpotRays<'a> {
         }
     }
 
-    fn direction(&self, number: usize) -> Option<Direction<Global>> {
-        let (chirp, sample) = (number / self.samples.len(), number % self.samples.len());
-        let spot = Spot::met(&self.beam, &self.axes[chirp], self.axis_range_m[chirp], chirp);
-        Some(spot.ray(self.samples[sample])?.direction)
+    /// Finds what the rays of the chirps from `first` on hit behind the sheets that they hit in front.
+    fn meet_behind(
+        &self,
+        setup: &Setup,
+        first: usize,
+        front: &[Option<Hit>],
+        hits: &mut [Option<Hit>],
+    ) {
+        let count = self.samples.len();
+        let (mut through, mut rays) = (Vec::new(), Vec::new());
+        for (chirp, front) in (first..).zip(front.chunks(count)) {
+            let mut spot = None;
+            for (sample, hit) in front.iter().enumerate() {
+                let Some(hit) = hit.filter(|hit| setup.sheet(hit.facet).is_some()) else {
+                    continue;
+                };
+                let spot = spot.get_or_insert_with(|| self.spot(chirp));
+                if let Some(ray) = spot.ray(self.samples[sample]) {
+                    through.push(((chirp - first) * count + sample, hit.range_m + LIFT_M));
+                    rays.push(onward(&hit, ray.direction));
+                }
+            }
+        }
+        if rays.is_empty() {
+            return;
+        }
+        let behind = setup.geometry.bvh.closest_of_spots(&rays, count);
+        for ((place, passed_m), hit) in through.into_iter().zip(behind) {
+            hits[place] = hit.map(|hit| Hit { range_m: passed_m + hit.range_m, ..hit });
+        }
+    }
+
+    fn spot(&self, chirp: usize) -> Spot {
+        Spot::met(&self.beam, &self.axes[chirp], self.axis_range_m[chirp], chirp)
     }
 }
 

@@ -4,6 +4,8 @@
 //! if their ranges differ by more than a spot diameter plus a slope of 60°. The edge is assumed halfway
 //! between them, so that distances are accurate to about one spacing of the scan.
 
+use std::ops::Range;
+
 use glam::DVec2;
 use rayon::prelude::*;
 
@@ -23,17 +25,29 @@ const CHIRPS_PER_TASK: usize = 512;
 pub(super) fn distances_m(chirps: &[(DVec2, Option<f64>)], spot_m: f64, reach_m: f64) -> Vec<f64> {
     let spacing_m = spacing_m(chirps);
     let near_m = NEIGHBOURHOOD * spacing_m;
-    let distinct = thin_out(chirps, spacing_m / 4.0);
+    let mut distinct = thin_out(chirps, spacing_m / 4.0);
+    let cells = Cells::sort(&mut distinct, |chirp| chirp.0, near_m);
     let places: Vec<DVec2> = distinct.iter().map(|chirp| chirp.0).collect();
-    let cells = Cells::new(&places, near_m);
+    // Most neighbours differ by less than a spot, which needs their ranges alone.
+    let ranges_m: Vec<f64> =
+        distinct.iter().map(|chirp| chirp.1.unwrap_or(f64::INFINITY)).collect();
     let nearest_across = |number: usize| {
-        let distance_m2 = |other: &usize| places[*other].distance_squared(places[number]);
-        let is_edge = |other: &usize| {
-            distance_m2(other) <= near_m * near_m
-                && is_across(distinct[number], distinct[*other], spot_m)
-        };
-        let others = cells.near(places[number]).filter(is_edge);
-        others.min_by(|a, b| distance_m2(a).total_cmp(&distance_m2(b)))
+        let (here, here_m) = (places[number], ranges_m[number]);
+        let mut nearest: Option<(f64, usize)> = None;
+        for others in cells.near(here) {
+            let steps = ranges_m[others.clone()].iter().map(|there_m| (here_m - there_m).abs());
+            // That of two that miss is no number.
+            for (other, _) in others.zip(steps).filter(|(_, step_m)| *step_m > spot_m) {
+                let distance_m2 = places[other].distance_squared(here);
+                if distance_m2 <= near_m * near_m
+                    && nearest.is_none_or(|(nearest_m2, _)| distance_m2 < nearest_m2)
+                    && is_across(distinct[number], distinct[other], spot_m)
+                {
+                    nearest = Some((distance_m2, other));
+                }
+            }
+        }
+        nearest.map(|(_, other)| other)
     };
     let across: Vec<Option<usize>> = (0..places.len())
         .into_par_iter()
@@ -50,11 +64,15 @@ pub(super) fn distances_m(chirps: &[(DVec2, Option<f64>)], spot_m: f64, reach_m:
         }
     }
     // Cells smaller than the spacing would mostly be empty.
-    let cells = Cells::new(&edges, reach_m.max(spacing_m));
+    let cells = Cells::sort(&mut edges, |edge| *edge, reach_m.max(spacing_m));
     let distance_m = |chirp: &(DVec2, Option<f64>)| {
-        let distance_m2 = |edge: usize| edges[edge].distance_squared(chirp.0);
-        let within = cells.near(chirp.0).map(distance_m2).filter(|&m2| m2 <= reach_m * reach_m);
-        within.fold(f64::INFINITY, f64::min).sqrt().min(reach_m)
+        let mut least_m2 = f64::INFINITY;
+        for near in cells.near(chirp.0) {
+            for edge in &edges[near] {
+                least_m2 = least_m2.min(edge.distance_squared(chirp.0));
+            }
+        }
+        least_m2.sqrt().min(reach_m)
     };
     chirps.par_iter().with_min_len(CHIRPS_PER_TASK).map(distance_m).collect()
 }
@@ -130,50 +148,45 @@ impl Frame {
     }
 }
 
-/// Points sorted into square cells, for searches within the side of a cell.
+/// Square cells that points are sorted into, for searches within the side of a cell.
 struct Cells {
     frame: Frame,
-    /// First place of each cell in `numbers`, and the length of the list.
+    /// First point of each cell, and the number of all.
     starts: Vec<u32>,
-    /// Numbers of the points, cell after cell.
-    numbers: Vec<u32>,
 }
 
 impl Cells {
-    fn new(points: &[DVec2], side_m: f64) -> Cells {
-        let frame = Frame::around(points.iter().copied(), side_m);
-        let within = |(point, number): (&DVec2, u32)| Some((frame.number_at(*point)?, number));
-        let cells: Vec<(usize, u32)> = points.iter().zip(0..).filter_map(within).collect();
+    /// Sorts items with a place by their cells, column after column. Those in no cell go.
+    fn sort<T: Copy>(items: &mut Vec<T>, place: impl Fn(&T) -> DVec2, side_m: f64) -> Cells {
+        let frame = Frame::around(items.iter().map(&place), side_m);
+        let within = |item: &T| Some((frame.number_at(place(item))?, *item));
+        let mut cells: Vec<(usize, T)> = items.iter().filter_map(within).collect();
+        cells.sort_by_key(|(cell, _)| *cell);
         let mut starts = vec![0; frame.columns * frame.rows + 1];
         cells.iter().for_each(|&(cell, _)| starts[cell + 1] += 1);
         for cell in 1..starts.len() {
             starts[cell] += starts[cell - 1];
         }
-        let (mut next, mut numbers) = (starts.clone(), vec![0; cells.len()]);
-        for (cell, number) in cells {
-            numbers[next[cell] as usize] = number;
-            next[cell] += 1;
-        }
-        Cells { frame, starts, numbers }
+        *items = cells.into_iter().map(|(_, item)| item).collect();
+        Cells { frame, starts }
     }
 
-    /// The points in the cell of a place and in its eight neighbours, which include all within one side of it.
-    fn near(&self, place: DVec2) -> impl Iterator<Item = usize> {
+    /// The points in the cell of a place and in its eight neighbours, which include all within one side of it, as ranges of the
+    /// sorted points.
+    fn near(&self, place: DVec2) -> [Range<usize>; 3] {
         let [column, row] = self.frame.cell(place);
         let low = row.saturating_sub(1).max(0);
         let high = row.saturating_add(1).min(self.frame.rows as i32 - 1);
-        let columns = [-1, 0, 1].map(|aside| column.saturating_add(aside));
-        let numbers = columns.into_iter().flat_map(move |column| self.in_column(column, low, high));
-        numbers.map(|&number| number as usize)
+        [-1, 0, 1].map(|aside| self.in_column(column.saturating_add(aside), low, high))
     }
 
     /// The points in the rows from `low` to `high` of a column.
-    fn in_column(&self, column: i32, low: i32, high: i32) -> &[u32] {
+    fn in_column(&self, column: i32, low: i32, high: i32) -> Range<usize> {
         match (self.frame.number(column, low), self.frame.number(column, high)) {
             (Some(first), Some(last)) if low <= high => {
-                &self.numbers[self.starts[first] as usize..self.starts[last + 1] as usize]
+                self.starts[first] as usize..self.starts[last + 1] as usize
             }
-            _ => &[],
+            _ => 0..0,
         }
     }
 }
@@ -228,10 +241,13 @@ mod tests {
         };
         let points: Vec<DVec2> = (0..400).map(|_| DVec2::new(next(), 2.0 * next())).collect();
         for side_m in [0.03, 0.2, 5.0] {
-            let cells = Cells::new(&points, side_m);
+            let mut sorted: Vec<(DVec2, usize)> = points.iter().copied().zip(0..).collect();
+            let cells = Cells::sort(&mut sorted, |point| point.0, side_m);
             for place in points.iter().map(|point| *point + 0.3 * DVec2::new(next(), next())) {
                 let within = |number: &usize| points[*number].distance(place) <= side_m;
-                let mut found: Vec<usize> = cells.near(place).filter(within).collect();
+                let near = cells.near(place).into_iter().flat_map(|near| &sorted[near]);
+                let mut found: Vec<usize> =
+                    near.map(|(_, number)| *number).filter(within).collect();
                 found.sort();
                 assert!((0..points.len()).filter(within).eq(found), "{place} {side_m}");
             }

@@ -6,7 +6,6 @@
 //! second-order paths.
 
 use glam::{DVec2, DVec3};
-use rayon::prelude::*;
 
 use super::error::RenderError;
 use super::observer::Observer;
@@ -16,13 +15,13 @@ use super::spot::{Footprints, Intersection};
 use super::surface::Orientation;
 use crate::brdf::Seen;
 use crate::effects::{
-    Conflict, Level, MeanEcho, Model, PredictionCache, Receiver, Setting, Shot, Stage, middle,
+    Conflict, Level, MeanEcho, Model, PredictionCache, Receiver, Setting, Shot, Stage, mean,
     shot_at, tilted_cos_theta,
 };
 use crate::frames::{Global, Ray};
 use crate::radar::random::{Key, Purpose};
 use crate::radar::{Channel, Link};
-use crate::trace::{Hit, ScanGeometry};
+use crate::trace::{Hit, ScanGeometry, closest};
 
 /// The model of a setup, prepared for its scan.
 pub(super) struct EffectScan<'a> {
@@ -58,7 +57,10 @@ impl<'a> EffectScan<'a> {
             progress: setup.geometry.chirps.progress(),
             receiver: model.received(),
         };
-        effects.middle = middle(&effects.shots());
+        // Where the axes of the beams hit the target where the scene places it.
+        let ScanGeometry { chirps, bvh, .. } = setup.geometry;
+        let hits = closest(bvh, &chirps.rays);
+        effects.middle = mean(hits.iter().flatten().map(|hit| hit.point.xyz));
         Some(effects)
     }
 
@@ -83,18 +85,35 @@ impl<'a> EffectScan<'a> {
         }
     }
 
-    /// Applies the effects to a single path.
+    /// Whether effects act on the whole echoes of all chirps together.
+    pub fn acts_on_echoes(&self) -> bool {
+        self.model.effects.iter().any(|(effect, values)| effect.survey_key(values).is_some())
+    }
+
+    /// Applies the effects to a single path, by way of a surface of which the antenna sees `f_per_sr`, with a normal towards the
+    /// radar where the mesh has it. `orientation` is that of a surface that effects have moved.
     pub fn direct(
         &self,
         path: Path,
-        chirp: usize,
-        ray: &Ray<Global>,
-        rays: usize,
+        (f_per_sr, normal): (f64, DVec3),
+        (chirp, ray, rays): (usize, &Ray<Global>, usize),
         orientation: Option<Orientation>,
         tilts: [f64; 2],
     ) -> Path {
         let stage = Stage { on_wavefront: rays > 1, ..self.stage() };
-        let shot = self.traced_shot(chirp, ray, path.hit, orientation);
+        let shot = match orientation {
+            Some(_) => self.traced_shot(chirp, ray, path.hit, orientation),
+            None => {
+                let lies = Orientation { normal, azimuth_rad: path.azimuth_rad };
+                self.shot(chirp, *ray, path.hit, Some(lies))
+            }
+        };
+        if orientation.is_none()
+            && tilts == [0.0; 2]
+            && let Some(gain) = self.model.gain_alone(&stage, &shot, f_per_sr)
+        {
+            return Path { power_w: path.power_w * gain, ..path };
+        }
         let with_w =
             tilted(&shot, tilts).map_or(0.0, |shot| self.model.arrived(&stage, &shot).power_w);
         let Some(Orientation { azimuth_rad, .. }) = orientation else {
@@ -163,10 +182,10 @@ impl<'a> EffectScan<'a> {
 
     /// The shot of a chirp's first ray that hits the target.
     fn first_shot(&self, footprints: &Footprints, chirp: usize) -> Option<Shot> {
-        let hits = footprints.hits.iter().zip(0..).skip(chirp * footprints.rays_per_chirp);
-        let mut hits = hits.take(footprints.rays_per_chirp);
-        let (hit, index) = hits.find_map(|(hit, index)| Some(((*hit)?, index)))?;
-        let orientation = footprints.orientations.get::<usize>(index).copied().flatten();
+        let first = chirp * footprints.rays_per_chirp;
+        let mut rays = first..first + footprints.rays_per_chirp;
+        let (hit, ray) = rays.find_map(|ray| Some((footprints.hits[ray]?, ray)))?;
+        let orientation = footprints.orientations.get(ray).copied().flatten();
         Some(self.traced_shot(chirp, &self.setup.geometry.chirps.rays[chirp], hit, orientation))
     }
 
@@ -180,15 +199,6 @@ impl<'a> EffectScan<'a> {
             antenna: self.observer.antenna(),
             middle: self.middle,
         }
-    }
-
-    /// The shot of every chirp whose axis hits the target where the scene places it.
-    fn shots(&self) -> Vec<Shot> {
-        let ScanGeometry { chirps, bvh, .. } = self.setup.geometry;
-        let rays = chirps.rays.par_iter().enumerate();
-        let shots =
-            rays.filter_map(|(chirp, ray)| Some(self.shot(chirp, *ray, bvh.closest(ray)?, None)));
-        shots.collect()
     }
 
     /// The shot of a ray with a hit on the target where the effects place it.

@@ -155,8 +155,8 @@ impl<'a> Paths<'a> {
             retros,
             changes: Vec::new(),
         };
-        paths.changes =
-            paths.effects.as_ref().map_or(Vec::new(), |effects| paths.changes_by(effects));
+        let on_echoes = paths.effects.as_ref().filter(|effects| effects.acts_on_echoes());
+        paths.changes = on_echoes.map_or(Vec::new(), |effects| paths.changes_by(effects));
         paths
     }
 
@@ -384,7 +384,8 @@ impl<'a> Reception<'a> {
         let bare = self.direct(point, view, seen);
         let effects = self.paths.effects.as_ref();
         let direct = effects.map_or(bare, |effects| {
-            effects.direct(bare, number, ray, rays, orientation, self.tilts)
+            let surface = (seen.f_per_sr, place.frame.normal());
+            effects.direct(bare, surface, (number, ray, rays), orientation, self.tilts)
         });
         paths.push(direct);
         if onward.len() > 0 {

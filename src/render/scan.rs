@@ -65,7 +65,8 @@ pub fn trace_placed(
     let geometry = &setup.geometry;
     let rays = rays_per_chirp.max(1);
     effect_scan::check(setup, rays, Observer::Radar)?;
-    let footprints = match EffectScan::new(setup, Observer::Radar) {
+    let moving = setup.effects.filter(|model| model.moves_target());
+    let footprints = match moving.and_then(|_| EffectScan::new(setup, Observer::Radar)) {
         None => spot::trace(geometry, rays, done),
         Some(effects) => {
             spot::trace_moved(geometry, rays, done, |chirp, ray, hit| effects.meet(chirp, ray, hit))
