@@ -200,7 +200,7 @@ impl Dataset {
         found.map_err(raised)
     }
 
-    /// Writes `croissant.json`, `README.md`, and the boxes in the form of COCO, for a data set that is complete.
+    /// Writes `croissant.json`, `README.md`, and the boxes in the forms of COCO and of Pascal VOC, for a data set that is complete.
     ///
     /// Returns
     /// -------

@@ -7,7 +7,7 @@ use crate::cli::summary::counted;
 use crate::dataset::Dataset;
 use crate::error::Error;
 
-/// Describe a complete data set for others: croissant.json, README.md and boxes in the form of COCO
+/// Describe a complete data set for others: croissant.json, README.md and boxes for COCO and Pascal VOC
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   matdb dataset publish ds")]
