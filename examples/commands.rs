@@ -23,22 +23,27 @@ pub fn page() -> String {
          the same.\n\nEvery command takes these options:\n\n"
     );
     text += &list(program.get_arguments().filter(|argument| argument.is_global_set()));
-    for command in program.get_subcommands_mut().filter(|command| command.get_name() != "help") {
-        text += &section(command);
+    let is_described = |command: &&mut Command| command.get_name() != "help";
+    for command in program.get_subcommands_mut().filter(is_described) {
+        let name = command.get_name().to_owned();
+        text += &format!("\n## {name}\n{}", section(command, &name));
+        for inner in command.get_subcommands_mut().filter(is_described) {
+            let name = format!("{name} {}", inner.get_name());
+            text += &format!("\n### {name}\n{}", section(inner, &name));
+        }
     }
     text
 }
 
-/// One command: what it does, how it is called, its arguments and its examples.
-fn section(command: &mut Command) -> String {
+/// One command by its whole name: what it does, how it is called, its arguments and its examples.
+fn section(command: &mut Command, name: &str) -> String {
     let about = command.get_about().map(ToString::to_string).unwrap_or_default();
     let usage = command.render_usage().to_string();
     let usage = usage.trim_start_matches("Usage: ");
-    let mut text =
-        format!("\n## {}\n\n{}.\n\n```text\n{usage}\n```\n\n", command.get_name(), prose(&about));
+    let mut text = format!("\n{}.\n\n```text\n{usage}\n```\n\n", prose(&about));
     let own = command.get_arguments().filter(|a| !a.is_global_set() && a.get_id() != "help");
     text += &list(own);
-    if let Some(call) = in_python(command.get_name()) {
+    if let Some(call) = in_python(name) {
         text += &format!("\n[In Python](python.md#commands-in-python): {call}.\n");
     }
     if let Some(after) = command.get_after_long_help().or(command.get_after_help()) {
