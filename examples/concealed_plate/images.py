@@ -6,7 +6,7 @@ import pyarrow.parquet
 
 from stranger import SIDE
 
-COLUMNS = ["scan", "chirp", "power_dbm", "range_m", "threat"]
+COLUMNS = ["scan", "chirp", "detected", "power_dbm", "range_m", "threat"]
 RELIEF_OVER = 4                                 # relief is range less its mean over this many pixels to each side
 
 
@@ -35,7 +35,7 @@ def pictures(table):
     threat = np.zeros(shape, bool)
     np.logical_or.at(threat, (scan, chirp), table["threat"])
     order = np.argsort(distance, kind="stable")
-    order = order[np.isfinite(power[order]) & np.isfinite(distance[order])]
+    order = order[table["detected"][order]]
     level, reach = np.full(shape, np.nan), np.full(shape, np.nan)
     level[scan[order], chirp[order]] = power[order]         # of several echoes the farthest is written last
     reach[scan[order], chirp[order]] = distance[order]
@@ -46,7 +46,7 @@ def pictures(table):
 
 
 def from_data_set(folder, split):
-    """Pictures of the scans of a split of a data set of matdb."""
+    """Pictures of the scans of a split of a data set of matdb. Echoes below the threshold are not seen."""
     rows = pyarrow.dataset.dataset(sorted(map(str, (folder / "points").glob(f"{split}-*.parquet"))))
     table = rows.to_table(columns=COLUMNS, filter=pyarrow.dataset.field("detected") | pyarrow.dataset.field("threat")
                           | (pyarrow.dataset.field("chirp") == 0))
@@ -55,5 +55,6 @@ def from_data_set(folder, split):
 
 def from_file(path):
     """Pictures of the scans of a file of the other generator."""
-    table = pyarrow.parquet.read_table(path, columns=COLUMNS)
-    return pictures({name: table[name].to_numpy() for name in COLUMNS})
+    table = pyarrow.parquet.read_table(path)
+    table = {name: table[name].to_numpy() for name in table.column_names}
+    return pictures({**table, "detected": np.isfinite(table["power_dbm"]) & np.isfinite(table["range_m"])})

@@ -5,6 +5,7 @@ python run.py --out DIR --matdb PATH [--small]. What a folder has already is not
 
 import argparse
 import concurrent.futures
+import contextlib
 import json
 import multiprocessing
 import shutil
@@ -92,6 +93,14 @@ def data_sets(options, size):
             matdb(options, "dataset", "run", f"{name}.toml", "-o", name)
 
 
+@contextlib.contextmanager
+def whole(path):
+    """A name to write to. What was written gets its own name once it is whole."""
+    part = path.with_name(f"part-{path.name}")
+    yield part
+    part.replace(path)
+
+
 def others(options, size):
     """Scans of the other generator."""
     count = {"plain": size["plain"], "effects": size["effects"], CEILING: 2 * size["scans"] * (CEILING in size["arms"])}
@@ -99,7 +108,8 @@ def others(options, size):
         path = options.out / f"{name}.parquet"
         if scans and not path.exists():
             table = stranger.scans(options.seed + 100 + number, scans, name == "effects")
-            pyarrow.parquet.write_table(pyarrow.table(table), path)
+            with whole(path) as part:
+                pyarrow.parquet.write_table(pyarrow.table(table), part)
 
 
 def own_pictures(options, size, arm, split):
@@ -120,7 +130,8 @@ def pictures(options, size):
         if not path.exists():
             seen, truth = (own_pictures(options, size, *wanted[name]) if name in wanted
                            else images.from_file(options.out / f"{name}.parquet"))
-            np.savez(path, pictures=seen, masks=truth)
+            with whole(path) as part:
+                np.savez(part, pictures=seen, masks=truth)
 
 
 def load(path, inputs):
@@ -143,7 +154,8 @@ def train(out, inputs, arm, seed, epochs):
             kept.update({f"{name} {key}": value for key, value in score.judge(masks, scores, truth).items()})
             if name == "effects":
                 kept["masks"] = masks.astype(np.float16)
-        np.savez_compressed(path, **kept)
+        with whole(path) as part:
+            np.savez_compressed(part, **kept)
     return path
 
 
