@@ -158,6 +158,11 @@ fn parts_threads_and_lost_files_change_no_byte() {
     );
     let found = said(here, &["dataset", "check", "parts"]);
     assert!(found.contains("5 of 5 shards, 20 scans") && found.contains("complete"), "{found}");
+    let table = fs::read(parts.join("scans.parquet")).unwrap();
+    fs::write(parts.join("scans.parquet"), &table[..table.len() / 2]).unwrap();
+    assert!(refused(here, &["dataset", "check", "parts"]).contains("is not complete"));
+    said(here, &["dataset", "run", "parts"]);
+    assert!(made(&parts) == whole);
     // The same specification in the same folder is the same plan.
     said(here, &["dataset", "run", "spec.toml", "-o", "parts"]);
     said(here, &["dataset", "publish", "parts"]);
@@ -225,6 +230,9 @@ fn what_cannot_be_is_refused_before_the_first_scan() {
     let root = tempfile::tempdir().unwrap();
     let here = root.path();
     let posterior = "[[posterior]]\nmaterial = \"aluminium\"\n";
+    let turned = "[[choose]]\nname = \"order\"\noption = [{ name = \"turned\", set = { region = [\
+                  { name = \"plate\", material = \"aluminium\", mesh = \"plate\" }, \
+                  { name = \"wall\", material = \"mannequin-paint\", mesh = \"wall\" }] } }]\n";
     let cases = [
         (
             SPEC.replace("from = [-0.05, 1.05, -0.15]", "from = [0.06, 1.05, -0.15]"),
@@ -299,6 +307,22 @@ fn what_cannot_be_is_refused_before_the_first_scan() {
             "radar.system_loss_db=[",
         ),
         (SPEC.replace("test = 0.4", "test = 0.01"), "split `test`: gets none of 20 scans"),
+        (
+            SPEC.replace("sd = 0.5", "sd = 0.5\nfrom = 14\nto = 13"),
+            "are no normal law; give as many",
+        ),
+        (
+            SPEC.replace(" set = {", " split = \"train\", set = {"),
+            "[[choose]] `object` leaves a split without any of its options",
+        ),
+        (
+            format!("{SPEC}{turned}"),
+            "the scene: has other meshes or regions than the specification's",
+        ),
+        (
+            format!("{SPEC}{posterior}{posterior}"),
+            "two [[posterior]] are of `aluminium`; leave one out",
+        ),
         // The plate stands outside the field of view.
         (
             SPEC.split("[[place]]")
@@ -320,6 +344,10 @@ fn what_cannot_be_is_refused_before_the_first_scan() {
         assert!(!here.join("ds").exists(), "{expected}");
     }
     write_inputs(here, SPEC);
+    // What a plan that was killed may have left.
+    fs::create_dir_all(here.join("ds/inputs")).unwrap();
+    fs::write(here.join("ds/inputs/scene.toml"), "half").unwrap();
+    fs::write(here.join("ds/spec.toml"), "half").unwrap();
     said(here, &["dataset", "plan", "spec.toml", "-o", "ds"]);
     let before = tree(&here.join("ds"));
     for (arguments, expected) in [

@@ -33,36 +33,41 @@ def _write(folder: Path, files: dict[str, bytes]) -> None:
         place = folder / name
         place.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=place.parent, prefix=".matdb-", delete=False) as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.chmod(file.name, 0o644)
-        os.replace(file.name, place)
+            try:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+                os.chmod(file.name, 0o644)
+                os.replace(file.name, place)
+            except OSError:
+                os.unlink(file.name)
+                raise
 
 
-def _made(folder: Path, shard: int, shards: int) -> dict[str, bytes]:
-    """Makes a shard in a folder with the plan, and gives its files, the manifest last."""
+def _made(folder: Path, shard: int, shards: int) -> tuple[int, dict[str, bytes]]:
+    """Makes a shard in a folder with the plan, and gives the number of scans and its files, the manifest last."""
     import matdb
 
-    matdb.dataset(folder).shard(shard, shards)
+    # A task has one core. The threads of this process begin with the first shard.
+    os.environ.setdefault("RAYON_NUM_THREADS", "1")
+    scans = matdb.dataset(folder).shard(shard, shards)["scans"]
     files: dict[str, bytes] = {}
     for path in sorted((folder / "manifests").glob("*.json")):
         manifest = json.loads(path.read_bytes())
         if manifest["shard"] == shard:
             files |= _files(folder, [one["file"] for one in manifest["files"]])
             files[str(path.relative_to(folder))] = path.read_bytes()
-    return files
+    return scans, files
 
 
-def _of_nothing_shared(plan: dict[str, bytes], shard: int, shards: int) -> dict[str, bytes]:
+def _of_nothing_shared(plan: dict[str, bytes], shard: int, shards: int) -> tuple[int, dict[str, bytes]]:
     with tempfile.TemporaryDirectory() as folder:
         _write(Path(folder), plan)
         return _made(Path(folder), shard, shards)
 
 
-def _of_shared_folder(folder: str, shard: int, shards: int) -> dict[str, bytes]:
-    _made(Path(folder), shard, shards)
-    return {}
+def _of_shared_folder(folder: str, shard: int, shards: int) -> tuple[int, dict[str, bytes]]:
+    return _made(Path(folder), shard, shards)[0], {}
 
 
 def run(dataset: Dataset, address: str, shared: bool, progress: Callable[[int, int], Any] | None) -> dict[str, int]:
@@ -85,13 +90,14 @@ def run(dataset: Dataset, address: str, shared: bool, progress: Callable[[int, i
         given, work = ray.put(_files(folder, PLAN)), _of_nothing_shared  # type: ignore[assignment]
     task = ray.remote(**settings)(work)
     waiting = [task.remote(given, shard, shards) for shard in missing]
-    done = 0
+    done = all_scans = 0
     while waiting:
         ready, waiting = ray.wait(waiting, num_returns=1)
-        _write(folder, ray.get(ready[0]))
-        done += 1
+        scans, files = ray.get(ready[0])
+        _write(folder, files)
+        done, all_scans = done + 1, all_scans + scans
         if progress is not None:
             progress(done, len(missing))
     # Writes the table of all scans.
     made: dict[str, int] = dataset.run()
-    return {**made, "shards": made["shards"] + len(missing)}
+    return {**made, "shards": made["shards"] + len(missing), "scans": made["scans"] + all_scans}

@@ -141,7 +141,7 @@ impl Dataset {
     /// Parameters
     /// ----------
     /// progress : callable, optional
-    ///     Called with the numbers of scans that are done and that this call makes.
+    ///     Called with the numbers of scans that are done and that this call makes; with `ray`, of shards.
     /// ray : str, optional
     ///     Address of a Ray cluster: `"auto"` for the one that this process is part of, or else one of this machine. A task makes a
     ///     shard.

@@ -326,8 +326,8 @@ def test_threats_materials_and_counts_follow_from_the_sight(labels):
     assert (points.threat == (points.sight_instance == 2)).all() and points.threat.any() and not points.threat.all()
     missed = points.instance == -1
     # A spot of one ray is the beam's axis.
-    assert (points.threat_share[~missed] == points.threat[~missed]).all()
-    measured = ["x_m", "y_m", "z_m", "range_m", "power_dbm", "mean_power_dbm", "true_range_m", "theta_deg", "threat_share"]
+    assert (points.threat_share == points.threat).all()
+    measured = ["x_m", "y_m", "z_m", "range_m", "power_dbm", "mean_power_dbm", "true_range_m", "theta_deg"]
     assert points.loc[missed, measured].isna().all(axis=None) and points.loc[~missed, measured].notna().all(axis=None)
     assert (points.detected == (points.power_dbm >= -50)).all() and points.detected.any() and not points.detected[~missed].all()
     for scan in labels.scans.to_dict("records"):

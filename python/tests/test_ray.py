@@ -75,6 +75,8 @@ def test_a_node_that_dies_changes_no_byte(inputs, cluster, shared):
 
     said = dataset.run(ray="auto", shared=shared, progress=progress)
     assert removed and said["missing"] == 0
+    # In a shared folder a lost task may have made its shard.
+    assert said["scans"] == 300 or (shared and said["scans"] < 300)
     assert dataset.check()["complete"]
     assert made(inputs / "on-ray") == made(inputs / "alone")
     # A second call has nothing to do.

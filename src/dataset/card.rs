@@ -2,7 +2,7 @@
 
 use super::plan::{Dataset, Plan, PlannedSplit};
 use super::points;
-use super::spec::{Choice, EffectDraw, Posterior, Variation};
+use super::spec::{Choice, EffectDraw, Numbers, Posterior, Variation};
 use super::table::Column;
 use crate::formats::words::{counted, listed};
 
@@ -69,11 +69,17 @@ pub(super) fn card(dataset: &Dataset, columns: &[Column]) -> String {
     }
     for Variation { keys, from, to, mean, sd, values } in &spec.vary {
         let how = match (from, to, mean, sd) {
+            (from, to, Some(mean), Some(sd)) => {
+                let ends = [("from", from), ("to", to)];
+                let ends = ends.into_iter().filter_map(|(word, ends)| {
+                    Some(format!(", {word} {:?}", ends.as_ref()?.list()))
+                });
+                let [mean, sd] = [mean, sd].map(Numbers::list);
+                let ends = ends.collect::<String>();
+                format!("normal, mean {mean:?} and standard deviation {sd:?}{ends}")
+            }
             (Some(from), Some(to), ..) => {
                 format!("from {:?} to {:?}, evenly", from.list(), to.list())
-            }
-            (.., Some(mean), Some(sd)) => {
-                format!("normal, mean {:?} and standard deviation {:?}", mean.list(), sd.list())
             }
             _ => format!(
                 "one of {}",

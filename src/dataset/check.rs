@@ -8,7 +8,8 @@ use serde::Serialize;
 
 use super::layout::{FOLDERS, SCANS};
 use super::plan::Dataset;
-use super::scan::ScanRow;
+use super::scans::{self, Row};
+use crate::files::read_whole;
 
 /// Files that are being written are left alone for so long.
 const BEING_WRITTEN: Duration = Duration::from_secs(600);
@@ -46,7 +47,8 @@ impl Dataset {
                 Ok(manifest) => {
                     found.done += 1;
                     found.scans += manifest.scans.len() as u32;
-                    rows.extend(manifest.scans);
+                    let name = self.recipe.split_of_shard(shard).shard_name(shard);
+                    rows.extend(manifest.scans.into_iter().map(|scan| (name.clone(), scan)));
                 }
                 Err(problem) => {
                     let name = self.recipe.split_of_shard(shard).shard_name(shard);
@@ -55,8 +57,8 @@ impl Dataset {
             }
         }
         problems.extend(self.leaks(&rows));
-        if found.done == found.shards && !self.folder.join(SCANS).is_file() {
-            problems.push(format!("{SCANS} is missing"));
+        if found.done == found.shards {
+            problems.extend(self.problem_of_table(&rows));
         }
         found.complete = problems.is_empty();
         let more = problems.len().saturating_sub(MOST_NAMED);
@@ -68,11 +70,21 @@ impl Dataset {
         found
     }
 
+    /// What is wrong with the table of all scans, by what the shards say.
+    fn problem_of_table(&self, rows: &[Row]) -> Option<String> {
+        let path = self.folder.join(SCANS);
+        if !path.is_file() {
+            return Some(format!("{SCANS} is missing"));
+        }
+        let agrees = read_whole(&path).ok() == scans::table(rows).ok();
+        (!agrees).then(|| format!("{SCANS} is not that of the shards' manifests"))
+    }
+
     /// What two splits share and should not, by what the scans themselves say.
-    fn leaks(&self, rows: &[ScanRow]) -> Vec<String> {
+    fn leaks(&self, rows: &[Row]) -> Vec<String> {
         let mut of_options: BTreeMap<(&str, &str), BTreeSet<&str>> = BTreeMap::new();
         for choice in self.recipe.spec.choose.iter().filter(|choice| choice.apart) {
-            for row in rows {
+            for (_, row) in rows {
                 if let Some(option) = row.options.get(&choice.name) {
                     of_options.entry((&choice.name, option)).or_default().insert(&row.split);
                 }

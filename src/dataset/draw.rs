@@ -30,7 +30,7 @@ pub(super) struct Drawn {
 }
 
 impl Drawn {
-    /// The options and numbers of a scan of a split. Normal laws give others in each attempt.
+    /// The options and numbers of a scan of a split. Numbers are others in each attempt.
     ///
     /// # Errors
     /// A key that is none.
@@ -42,7 +42,6 @@ impl Drawn {
             drawn.choose(choice, &split.options[entry], draws.uniform())?;
         }
         for (entry, variation) in spec.vary.iter().enumerate() {
-            let attempt = if variation.mean.is_some() { attempt } else { 0 };
             let entry = entry + (attempt << 16);
             let mut draws = stream(spec.seed, target, Kind::Variation, entry);
             drawn.vary(variation, &mut draws)?;
@@ -117,9 +116,11 @@ impl Drawn {
 
     /// Records the effects and materials that were drawn.
     pub fn note_all(&mut self, effects: &[DrawnEffect], materials: &[DrawnMaterial]) {
-        for DrawnEffect { entry, .. } in effects {
+        for DrawnEffect { entry, material, .. } in effects {
+            // Several materials may have one effect.
+            let of = material.as_ref().map_or(String::new(), |material| format!("{material}."));
             for (parameter, value) in &entry.parameters {
-                self.numbers.insert(format!("effect.{}.{parameter}", entry.name), *value);
+                self.numbers.insert(format!("effect.{}.{of}{parameter}", entry.name), *value);
             }
         }
         for DrawnMaterial { name, numbers, .. } in materials {

@@ -126,12 +126,15 @@ fn stated(report: &str, copy: Option<&PathBuf>, name: &str) -> Result<Vec<(Strin
         return Err(refused(report, problem, "name one that it found, or give parameters"));
     };
     let numbers = effect["parameters"].as_object().into_iter().flatten();
-    let laws: Vec<(String, Law)> = numbers
-        .filter_map(|(name, number)| {
-            let mean = number["value"].as_f64()?;
-            Some((name.clone(), Law::Normal { mean, sd: number["sd"].as_f64().unwrap_or(0.0) }))
-        })
-        .collect();
+    let mut laws = Vec::new();
+    for (parameter, number) in numbers {
+        let Some(mean) = number["value"].as_f64() else { continue };
+        let Some(sd) = number["sd"].as_f64() else {
+            let problem = format!("states no standard deviation of {parameter} of `{name}`");
+            return Err(refused(report, problem, "give parameters with their ends in its place"));
+        };
+        laws.push((parameter.clone(), Law::Normal { mean, sd }));
+    }
     if laws.is_empty() {
         return Err(refused(report, "states no numbers of it", "give parameters"));
     }

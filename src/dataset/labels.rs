@@ -26,7 +26,7 @@ pub struct Classes {
 /// What lies along the axis of a chirp's beam.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Sight {
-    /// The first surface that lets nothing through, or the last that the ray reaches.
+    /// An object that is looked for, or else the first surface that lets nothing through, or the last that the ray reaches.
     pub hit: Hit,
     /// Number of its mesh, from 1.
     pub instance: u16,
@@ -34,8 +34,6 @@ pub(super) struct Sight {
     pub region: u16,
     /// Its material.
     pub material: u16,
-    /// Share of the rays of the spot that meet an object that is looked for, behind whatever is in front.
-    pub object_share: f32,
 }
 
 impl Classes {
@@ -103,33 +101,30 @@ impl<'a> Labels<'a> {
         self.materials[usize::from(region)]
     }
 
-    /// What lies along every chirp's axis; none where it hits nothing.
-    pub fn sights(&self, setup: &Setup, footprints: &Footprints) -> Vec<Option<Sight>> {
+    /// What lies along every chirp's axis, none where it hits nothing, and the share of the rays of its spot that meet an object
+    /// that is looked for. Of several rays the first is the nearest to the axis.
+    pub fn sights(&self, setup: &Setup, footprints: &Footprints) -> (Vec<Option<Sight>>, Vec<f32>) {
         let rays = footprints.rays_per_chirp.max(1);
         let layers: Vec<&[Option<Hit>]> = std::iter::once(&footprints.hits)
             .chain(footprints.behind.iter().map(|behind| &behind.hits))
             .map(Vec::as_slice)
             .collect();
-        let chirps = footprints.hits.len() / rays;
-        let mut sights = Vec::with_capacity(chirps);
-        for chirp in 0..chirps {
-            let deepest =
-                |ray: usize| layers.iter().rev().find_map(|layer| layer[chirp * rays + ray]);
-            let on_object = (0..rays).filter(|&ray| {
-                deepest(ray).is_some_and(|hit| self.is_object(self.instance(hit.facet)))
-            });
-            let object_share = on_object.count() as f32 / rays as f32;
-            sights.push(deepest(0).map(|hit| {
+        let is_on_object = |hit: &Hit| self.is_object(self.instance(hit.facet));
+        let shown = |ray: usize| {
+            let on_its_way = || layers.iter().filter_map(|layer| layer[ray]);
+            on_its_way().find(is_on_object).or_else(|| on_its_way().last())
+        };
+        let (mut sights, mut object_shares) = (Vec::new(), Vec::new());
+        for first in (0..footprints.hits.len()).step_by(rays) {
+            let spot = first..first + rays;
+            let on_object = spot.filter(|&ray| shown(ray).is_some_and(|hit| is_on_object(&hit)));
+            object_shares.push(on_object.count() as f32 / rays as f32);
+            sights.push(shown(first).map(|hit| {
                 let region = setup.geometry.region_of_facet[hit.facet as usize];
-                Sight {
-                    hit,
-                    instance: self.instance(hit.facet),
-                    region,
-                    material: self.material(region),
-                    object_share,
-                }
+                let (instance, material) = (self.instance(hit.facet), self.material(region));
+                Sight { hit, instance, region, material }
             }));
         }
-        sights
+        (sights, object_shares)
     }
 }

@@ -4,6 +4,8 @@
 pub(super) const PLAN: &str = "plan.toml";
 /// The specification, as it was written.
 pub(super) const SPEC: &str = "spec.toml";
+/// The folder of what a data set is made of.
+pub(super) const INPUTS: &str = "inputs";
 /// The scene, as it was written.
 pub(super) const SCENE: &str = "inputs/scene.toml";
 /// The materials of its regions.

@@ -8,13 +8,13 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::labels::Classes;
-use super::layout::{MATERIALS, PLAN, SCENE, SPEC};
+use super::layout::{INPUTS, MATERIALS, PLAN, SCENE, SPEC};
 use super::recipe::Recipe;
 use super::scan::MadeScan;
 use super::shard::{ShardFiles, write_inside};
 use super::spec::{Spec, at, format_error};
 use crate::error::Error;
-use crate::files::{read_small, read_whole, write_all};
+use crate::files::{read_small, read_whole};
 use crate::formats::text::{from_toml, to_toml};
 use crate::material::Material;
 use crate::radar::Pattern;
@@ -106,8 +106,10 @@ impl Dataset {
             let known = Dataset::open(folder)?;
             return known.check_same(&gathered).map(|()| known);
         }
-        let is_taken = folder.read_dir().is_ok_and(|mut entries| entries.next().is_some());
-        if is_taken {
+        // A plan that was interrupted may have left some of its inputs.
+        let is_own = |name: &str| name == SPEC || name == INPUTS || name.starts_with(".matdb-");
+        let mut names = folder.read_dir().into_iter().flatten().flatten();
+        if names.any(|entry| !is_own(&entry.file_name().to_string_lossy())) {
             return Err(Error::usage(
                 format!("{} has other files in it", folder.display()),
                 "give a new or an empty folder",
@@ -119,8 +121,9 @@ impl Dataset {
         write_inside(staged.path(), &gathered.files)?;
         let recipe = recipe(staged.path(), &gathered.inputs, &gathered.scene)?;
         let plan = planned(&recipe, &gathered)?;
-        write_inside(folder, &gathered.files)?;
-        write_all(folder, &[(PLAN, to_toml(&plan)?.into_bytes())])?;
+        let mut files = gathered.files;
+        files.push((PLAN.to_owned(), to_toml(&plan)?.into_bytes()));
+        write_inside(folder, &files)?;
         Dataset::open(folder)
     }
 
@@ -239,7 +242,7 @@ impl Gathered {
                 continue;
             }
             let base = Path::new(name).file_name().unwrap_or_default().to_string_lossy();
-            let file = format!("inputs/{:02}-{base}", gathered.files.len());
+            let file = format!("{INPUTS}/{:02}-{base}", gathered.files.len());
             let bytes = read_whole(&folder.join(name))?;
             gathered.add(name, &file, bytes);
         }

@@ -17,6 +17,7 @@ struct Row<'a> {
     detected: bool,
     echo: Option<&'a Echo>,
     sight: Option<&'a Sight>,
+    object_share: f32,
 }
 
 impl Row<'_> {
@@ -221,7 +222,7 @@ const COLUMNS: [Entry; 32] = [
         "threat_share",
         "1",
         "share of the spot's rays that hit an object that is looked for, behind sheets",
-        Fill::Float(|row| row.of_sight(|sight| sight.object_share.into())),
+        Fill::Float(|row| row.object_share),
     ),
     (
         "threat",
@@ -261,7 +262,7 @@ pub(super) fn rows(
     ready: &ReadyScene,
     scan: u32,
     views: &[View],
-    sights: &[Option<Sight>],
+    (sights, object_shares): (&[Option<Sight>], &[f32]),
     labels: &Labels,
 ) -> (Vec<Values>, Counts) {
     let chirps = &ready.scene.chirps;
@@ -285,6 +286,7 @@ pub(super) fn rows(
                 detected: false,
                 echo: None,
                 sight: sight.as_ref(),
+                object_share: object_shares[place],
             };
             let before = all.len();
             while let Some(echo) = echoes.next_if(|echo| echo.chirp == row.chirp) {

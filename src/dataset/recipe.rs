@@ -18,7 +18,7 @@ use crate::radar::Pattern;
 use crate::scene::{GivenMaterials, GivenMeshes, KeyChange, Scene, SceneFile};
 use crate::setup::ReadyScene;
 
-/// How often the normal laws of a scan are drawn again.
+/// How often the numbers and places of a scan are drawn again.
 const MOST_ATTEMPTS: usize = 20;
 
 /// A data set that can be made, scan by scan.
@@ -120,9 +120,9 @@ impl Recipe {
     /// # Errors
     /// A scene that cannot be, by the scan's name.
     pub fn target(&self, scan: u32) -> Result<Target, Error> {
-        // A normal law has no ends by itself, and may draw what no scene can have.
-        let is_normal = self.spec.vary.iter().any(|variation| variation.mean.is_some());
-        let more = if is_normal { MOST_ATTEMPTS } else { 0 };
+        // Numbers may be what no scene can have, or leave no place for a mesh.
+        let is_random = !self.spec.vary.is_empty() || !self.spec.place.is_empty();
+        let more = if is_random { MOST_ATTEMPTS } else { 0 };
         let made = self.attempt(scan, 0).or_else(|error| {
             (1..=more).find_map(|attempt| self.attempt(scan, attempt).ok()).ok_or(error)
         });
@@ -146,6 +146,7 @@ impl Recipe {
         drawn.note_all(&effects, &materials);
 
         let mut file = self.changed(&drawn.changes)?;
+        self.check_classes(&file)?;
         file.name = self.key(scan);
         for entry in &mut file.mesh {
             entry.file = format!("given:{}", entry.file);
@@ -158,6 +159,7 @@ impl Recipe {
         }
         let mut placed = Vec::new();
         for (entry, placing) in spec.place.iter().enumerate() {
+            let entry = entry + (attempt << 16);
             let mut draws = stream(spec.seed, target, Kind::Place, entry);
             let put = place::put(placing, &mut file, &self.shown, &self.meshes, &mut draws)?;
             placed.push((placing.mesh.clone(), put));
@@ -181,6 +183,20 @@ impl Recipe {
         scene.given = given;
         let ready = ReadyScene::new(scene, &self.shown, None)?;
         Ok(Target { ready, drawn, placed })
+    }
+
+    /// Refuses a scene whose meshes or regions are others, so that labels would name the wrong ones.
+    fn check_classes(&self, file: &SceneFile) -> Result<(), Error> {
+        let Classes { instances, regions, .. } = &self.classes;
+        let meshes = file.mesh.iter().map(|mesh| &mesh.name);
+        if meshes.eq(instances) && file.region.iter().map(|region| &region.name).eq(regions) {
+            return Ok(());
+        }
+        Err(refused(
+            "the scene",
+            "has other meshes or regions than the specification's, or in another order",
+            "change keys of single meshes and regions, such as mesh.body.scale, and not their lists",
+        ))
     }
 
     /// The scene with some changes; an error names the first that cannot be made.

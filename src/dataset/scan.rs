@@ -67,12 +67,13 @@ impl Recipe {
         let materials = of_regions.map(|&place| ready.materials[usize::from(place)].name.as_str());
         let target = &ready.scene.target;
         let labels = Labels::new(&self.classes, &target.meshes, materials);
-        let sights = labels.sights(&setup, &footprints);
+        let (sights, object_shares) = labels.sights(&setup, &footprints);
         let mut chirps_of_instance = vec![0; target.meshes.len()];
         for sight in sights.iter().flatten() {
             chirps_of_instance[usize::from(sight.instance) - 1] += 1;
         }
-        let (points, counts) = points::rows(&ready, number, &views, &sights, &labels);
+        let (points, counts) =
+            points::rows(&ready, number, &views, (&sights, &object_shares), &labels);
 
         let (mut images, mut image) = (Vec::new(), None);
         if self.spec.images {

@@ -286,7 +286,12 @@ impl Spec {
             })?;
         }
         self.place.iter().try_for_each(Placing::check)?;
+        let mut drawn = BTreeSet::new();
         for Posterior { material, inflate, .. } in &self.posterior {
+            if !drawn.insert(material) {
+                let problem = format!("two [[posterior]] are of `{material}`");
+                return Err((problem, "leave one out"));
+            }
             if !(*inflate >= 0.0 && *inflate <= 100.0) {
                 let problem = format!("[[posterior]] of `{material}`: inflate = {inflate}");
                 return Err((problem, "give 0 to 100; 1 is the fit's own covariance"));
@@ -389,6 +394,17 @@ impl Spec {
                 );
                 return Err((problem, "give an option or more for each split, or fewer splits"));
             }
+            let given: BTreeSet<&str> =
+                option.iter().filter_map(|one| one.split.as_deref()).collect();
+            let free = option.iter().filter(|one| one.split.is_none()).count();
+            if *apart && free < self.splits().len() - given.len() {
+                let problem =
+                    format!("[[choose]] `{name}` leaves a split without any of its options");
+                return Err((
+                    problem,
+                    "give each split an option, or more options without a split",
+                ));
+            }
             let sets = option.iter().map(|one| format!("{:?}", one.set));
             if *apart && sets.collect::<BTreeSet<_>>().len() < option.len() {
                 let problem =
@@ -424,16 +440,27 @@ impl Variation {
             }
             (from, to, Some(mean), Some(sd), []) => {
                 let (mean, sd) = (mean.list(), sd.list());
-                let ends = [from, to].into_iter().flatten();
+                let ends = [from, to].map(|ends| ends.as_ref().map(Numbers::list));
+                let are_in_order = match ends {
+                    [Some(from), Some(to)] => from.iter().zip(to).all(|(from, to)| from <= to),
+                    _ => true,
+                };
+                let mut given = ends.into_iter().flatten();
                 let is_law = mean.len() == sd.len()
-                    && ends.into_iter().all(|ends| ends.list().len() == mean.len())
+                    && are_in_order
+                    && given.all(|ends| {
+                        ends.len() == mean.len() && !ends.iter().any(|end| end.is_nan())
+                    })
                     && mean.iter().chain(sd).all(|number| number.is_finite())
                     && sd.iter().all(|sd| *sd >= 0.0);
                 if is_law {
                     return Ok(());
                 }
                 let problem = format!("mean {mean:?} and sd {sd:?} are no normal law");
-                Err((problem, "give as many numbers in both and in from and to, sd 0 or more"))
+                Err((
+                    problem,
+                    "give as many numbers in both and in from and to, sd 0 or more, the smaller ends in from",
+                ))
             }
             (None, None, None, None, [_, ..]) => Ok(()),
             _ => Err(("says not one way to draw".to_owned(), WAYS)),
