@@ -887,8 +887,12 @@ def test_what_a_node_makes_without_a_shared_folder_is_what_is_made_here(labels, 
 
     plan = _ray._files(labels.data, _ray.PLAN)
     shards = len(list((labels.data / "points").iterdir()))
+    scans = 0
     for shard in range(shards):
-        _ray._write(tmp_path, _ray._of_nothing_shared(plan, shard, shards))
+        made, files = _ray._of_nothing_shared(plan, shard, shards)
+        _ray._write(tmp_path, files)
+        scans += made
+    assert scans == len(labels.scans)
     here = bytes_of(labels.data)
     made = bytes_of(tmp_path)
     assert len(made) > 2 and all(here[name] == content for name, content in made.items())
