@@ -158,6 +158,16 @@ fn parts_threads_and_lost_files_change_no_byte() {
     );
     let found = said(here, &["dataset", "check", "parts"]);
     assert!(found.contains("5 of 5 shards, 20 scans") && found.contains("complete"), "{found}");
+    let manifest = named("manifests");
+    let text = fs::read_to_string(&manifest).unwrap();
+    let mut record: Value = serde_json::from_str(&text).unwrap();
+    record["scans"].as_array_mut().unwrap().pop();
+    for changed in [record.to_string(), text.replacen(".parquet", ".parquett", 1)] {
+        fs::write(&manifest, changed).unwrap();
+        assert!(refused(here, &["dataset", "check", "parts"]).contains("is not complete"));
+    }
+    said(here, &["dataset", "run", "parts"]);
+    assert!(made(&parts) == whole);
     let table = fs::read(parts.join("scans.parquet")).unwrap();
     fs::write(parts.join("scans.parquet"), &table[..table.len() / 2]).unwrap();
     assert!(refused(here, &["dataset", "check", "parts"]).contains("is not complete"));
@@ -374,7 +384,16 @@ fn what_cannot_be_is_refused_before_the_first_scan() {
     let text = fs::read_to_string(&plan).unwrap();
     fs::write(&plan, text.replace("program = \"matdb ", "program = \"matdb 9")).unwrap();
     assert!(refused(here, &["dataset", "run", "ds"]).contains("was planned by matdb 9"));
-    fs::write(&plan, text.replace("first_scan = \"", "first_scan = \"0")).unwrap();
+    for (from, to) in [
+        ("first_scan = \"", "first_scan = \"0"),
+        ("shards = ", "shards = 1"),
+        ("\"wall\"", "\"hall\""),
+    ] {
+        fs::write(&plan, text.replacen(from, to, 1)).unwrap();
+        let problem = refused(here, &["dataset", "check", "ds"]);
+        assert!(problem.contains("plan.toml is not what it was when"), "{problem}");
+    }
+    fs::write(&plan, of_another_machine(&text)).unwrap();
     assert!(
         refused(here, &["dataset", "run", "ds"]).contains("the first scan has other bytes here")
     );
@@ -391,6 +410,20 @@ fn what_cannot_be_is_refused_before_the_first_scan() {
         refused(here, &["dataset", "run", "ds"])
             .contains("is not what it was when the data set was planned")
     );
+}
+
+/// A plan whose first scan has other bytes.
+fn of_another_machine(plan: &str) -> String {
+    let mut plan: toml::Table = plan.parse().unwrap();
+    let mut id = blake3::Hasher::new();
+    id.update(plan["program"].as_str().unwrap().as_bytes());
+    id.update(b"other bytes");
+    for input in plan["input"].as_array().unwrap() {
+        id.update(input["blake3"].as_str().unwrap().as_bytes());
+    }
+    plan.insert("first_scan".to_owned(), "other bytes".into());
+    plan.insert("id".to_owned(), id.finalize().to_hex().to_string().into());
+    plan.to_string()
 }
 
 #[test]

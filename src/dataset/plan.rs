@@ -164,6 +164,13 @@ impl Dataset {
             }
         }
         let recipe = recipe(folder, &plan.input, &folder.join(SCENE))?;
+        let Plan { first_scan, seconds_per_scan, bytes_per_scan, input, .. } = plan.clone();
+        if Plan::of(&recipe, input, first_scan, seconds_per_scan, bytes_per_scan) != plan {
+            return Err(Error::usage(
+                format!("{} is not what it was when the data set was planned", path.display()),
+                "bring it back, or plan anew in another folder",
+            ));
+        }
         Ok(Dataset { folder: folder.to_owned(), plan, recipe })
     }
 
@@ -402,28 +409,42 @@ fn planned(recipe: &Recipe, gathered: &Gathered) -> Result<Plan, Error> {
     let first = ShardFiles::new(&made[..1])?;
     let all = ShardFiles::new(&made)?;
     let seconds_per_scan = core_seconds / f64::from(trials);
-    let first_scan = first.blake3();
-    let mut id = blake3::Hasher::new();
-    id.update(PROGRAM.as_bytes());
-    id.update(first_scan.as_bytes());
-    gathered.inputs.iter().for_each(|input| _ = id.update(input.blake3.as_bytes()));
-    let split = recipe.splits.iter().map(|split| PlannedSplit {
-        name: split.name.clone(),
-        scans: split.scans,
-        shards: split.shards,
-        apart: split.apart(spec),
-    });
-    Ok(Plan {
-        name: spec.name.clone(),
-        program: PROGRAM.to_owned(),
-        id: id.finalize().to_hex().to_string(),
-        first_scan,
-        scans: spec.scans,
-        shards: recipe.shards(),
-        seconds_per_scan,
-        bytes_per_scan: all.bytes() / u64::from(trials),
-        classes: recipe.classes.clone(),
-        split: split.collect(),
-        input: gathered.inputs.clone(),
-    })
+    let bytes_per_scan = all.bytes() / u64::from(trials);
+    Ok(Plan::of(recipe, gathered.inputs.clone(), first.blake3(), seconds_per_scan, bytes_per_scan))
+}
+
+impl Plan {
+    /// The plan of a data set, of which so much was measured.
+    fn of(
+        recipe: &Recipe,
+        input: Vec<Input>,
+        first_scan: String,
+        seconds_per_scan: f64,
+        bytes_per_scan: u64,
+    ) -> Plan {
+        let spec = &recipe.spec;
+        let mut id = blake3::Hasher::new();
+        id.update(PROGRAM.as_bytes());
+        id.update(first_scan.as_bytes());
+        input.iter().for_each(|input| _ = id.update(input.blake3.as_bytes()));
+        let split = recipe.splits.iter().map(|split| PlannedSplit {
+            name: split.name.clone(),
+            scans: split.scans,
+            shards: split.shards,
+            apart: split.apart(spec),
+        });
+        Plan {
+            name: spec.name.clone(),
+            program: PROGRAM.to_owned(),
+            id: id.finalize().to_hex().to_string(),
+            first_scan,
+            scans: spec.scans,
+            shards: recipe.shards(),
+            seconds_per_scan,
+            bytes_per_scan,
+            classes: recipe.classes.clone(),
+            split: split.collect(),
+            input,
+        }
+    }
 }

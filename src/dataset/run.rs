@@ -220,6 +220,17 @@ impl Dataset {
         if manifest.id != self.plan.id || manifest.shard != shard {
             return Err("is of another plan".to_owned());
         }
+        let split = &self.recipe.split_of_shard(shard).name;
+        let mut files = vec![layout::points(&name)];
+        files.extend(self.recipe.spec.images.then(|| layout::images(&name)));
+        let of_scans = self.scans_of(shard).map(|scan| (scan, self.recipe.key(scan)));
+        let agrees = manifest.files.iter().map(|one| &one.file).eq(&files)
+            && manifest.scans.iter().map(|row| (row.scan, row.key.clone())).eq(of_scans)
+            && manifest.scans.iter().all(|row| row.split == *split)
+            && manifest.split == *split;
+        if !agrees {
+            return Err("has a manifest of other files or scans".to_owned());
+        }
         Ok(manifest)
     }
 
@@ -291,6 +302,8 @@ impl Dataset {
 
 /// The BLAKE3 of a file; none of one that cannot be read.
 fn hash_of(path: &Path) -> Option<String> {
+    // Anything else might have no end.
+    path.metadata().ok().filter(std::fs::Metadata::is_file)?;
     let mut hasher = blake3::Hasher::new();
     hasher.update_reader(std::fs::File::open(path).ok()?).ok()?;
     Some(hasher.finalize().to_hex().to_string())

@@ -19,14 +19,61 @@ use super::error::FormatError;
 /// assert!(refused.to_string().contains("did you mean `diameter_m`"), "{refused}");
 /// ```
 pub fn from_toml<T: DeserializeOwned>(text: &str) -> Result<T, FormatError> {
-    toml::from_str(text).map_err(|error| {
+    let record = toml::from_str(text).map_err(|error| {
         let place = match error.span() {
             Some(span) => line_and_column(text, span.start),
             None => "the file".to_owned(),
         };
         let (problem, way_out) = explain(error.message());
         FormatError::at(place, problem, way_out)
-    })
+    })?;
+    match too_long::<T>(text) {
+        Some(place) => Err(FormatError::at(place, "more entries than it takes", "remove the last")),
+        None => Ok(record),
+    }
+}
+
+/// A list that has more entries than are read, which the parser of texts drops without a word and that of values does not.
+fn too_long<T: DeserializeOwned>(text: &str) -> Option<String> {
+    let whole = Value::Table(toml::from_str(text).ok()?);
+    let is_refused = |value: Value| {
+        value
+            .try_into::<T>()
+            .is_err_and(|error| error.to_string().contains("fewer elements in array"))
+    };
+    if !is_refused(whole.clone()) {
+        return None;
+    }
+    let is_it = |path: &Vec<String>| {
+        let mut shorter = whole.clone();
+        let list = path.iter().try_fold(&mut shorter, |value, step| match value {
+            Value::Array(list) => list.get_mut(step.parse::<usize>().ok()?),
+            value => value.get_mut(step),
+        });
+        list.and_then(Value::as_array_mut).and_then(Vec::pop).is_some() && !is_refused(shorter)
+    };
+    let mut paths = Vec::new();
+    lists(&whole, &mut Vec::new(), &mut paths);
+    // The innermost: a list of which that one is a part would be right without it, too.
+    let found = paths.iter().rev().find(|path| is_it(path));
+    Some(found.map_or("a list".to_owned(), |path| format!("`{}`", path.join("."))))
+}
+
+/// Appends the paths of all lists in a value.
+fn lists(value: &Value, path: &mut Vec<String>, all: &mut Vec<Vec<String>>) {
+    let inner: Vec<(String, &Value)> = match value {
+        Value::Array(list) => {
+            all.push(path.clone());
+            list.iter().enumerate().map(|(place, inner)| (place.to_string(), inner)).collect()
+        }
+        Value::Table(table) => table.iter().map(|(key, inner)| (key.clone(), inner)).collect(),
+        _ => Vec::new(),
+    };
+    for (step, inner) in inner {
+        path.push(step);
+        lists(inner, path, all);
+        path.pop();
+    }
 }
 
 /// Writes a record as TOML.
@@ -168,6 +215,26 @@ mod tests {
 
     fn message(text: &str) -> String {
         from_toml::<Sample>(text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_list_that_is_too_long_is_refused_by_its_name() {
+        #[derive(serde::Deserialize, Debug)]
+        #[allow(dead_code)]
+        struct Sizes {
+            size: Vec<Size>,
+        }
+        #[derive(serde::Deserialize, Debug)]
+        #[allow(dead_code)]
+        struct Size {
+            size_m: [f64; 3],
+            others: Vec<f64>,
+        }
+        let first = "[[size]]\nsize_m = [1, 2, 3]\nothers = [1, 2, 3, 4, 5]\n";
+        let text = |last: &str| format!("{first}[[size]]\nsize_m = [1, 2, 3{last}]\nothers = []\n");
+        assert!(from_toml::<Sizes>(&text("")).is_ok());
+        let said = from_toml::<Sizes>(&text(", 4")).unwrap_err().to_string();
+        assert_eq!(said, "`size.1.size_m`: more entries than it takes; remove the last");
     }
 
     #[test]
