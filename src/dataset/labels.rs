@@ -112,7 +112,7 @@ impl<'a> Labels<'a> {
         let is_on_object = |hit: &Hit| self.is_object(self.instance(hit.facet));
         let shown = |ray: usize| {
             let on_its_way = || layers.iter().filter_map(|layer| layer[ray]);
-            on_its_way().find(is_on_object).or_else(|| on_its_way().last())
+            on_its_way().find(is_on_object).or_else(|| on_its_way().next_back())
         };
         let (mut sights, mut object_shares) = (Vec::new(), Vec::new());
         for first in (0..footprints.hits.len()).step_by(rays) {
