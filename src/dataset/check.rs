@@ -43,17 +43,14 @@ impl Dataset {
         };
         let (mut problems, mut rows) = (Vec::new(), Vec::new());
         for shard in 0..self.plan.shards {
+            let name = self.recipe.split_of_shard(shard).shard_name(shard);
             match self.whole(shard) {
                 Ok(manifest) => {
                     found.done += 1;
                     found.scans += manifest.scans.len() as u32;
-                    let name = self.recipe.split_of_shard(shard).shard_name(shard);
                     rows.extend(manifest.scans.into_iter().map(|scan| (name.clone(), scan)));
                 }
-                Err(problem) => {
-                    let name = self.recipe.split_of_shard(shard).shard_name(shard);
-                    problems.push(format!("shard {name} {problem}"));
-                }
+                Err(problem) => problems.push(format!("shard {name} {problem}")),
             }
         }
         problems.extend(self.leaks(&rows));
