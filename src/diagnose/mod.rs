@@ -6,7 +6,7 @@
 //! without an effect. A score test screens the library on a sample of the shots. The best few effects are
 //! fitted together with the scattering models and must predict patches of the scan that took no part in their fit. When no
 //! further effect does, effects that others made superfluous are removed. The remainder is tested: by a smooth field
-//! over every covariate, by the correlation of neighbours, by the scatter, by the order of the chirps, and for outliers.
+//! over every covariate, by the correlation of neighbours, by the scatter, by the order of the chirps, for waves, and for outliers.
 //!
 //! | step | file |
 //! |---|---|
@@ -66,6 +66,7 @@ mod shared;
 mod shots;
 mod size;
 mod space;
+mod spectrum;
 mod subject;
 mod support;
 #[cfg(test)]
@@ -74,6 +75,7 @@ mod told;
 mod trial;
 mod unresolved;
 mod views;
+mod waves;
 
 pub use alarms::{Alarms, FalseAlarms};
 pub use error::DiagnoseError;

@@ -12,10 +12,10 @@
 use std::f64::consts::LN_2;
 
 use num_complex::Complex;
-use rustfft::FftPlanner;
 
 use super::residual::ResidualStructure;
 use super::shared::SharedSpeckle;
+use super::spectrum::{level, transform, weights};
 use crate::effects::Shot;
 
 /// Lines on either side of one that its level is taken from, but for the nearest.
@@ -29,8 +29,6 @@ const CHANCE: f64 = 1e-4;
 const MOST_PLACES: usize = 64;
 /// Largest residual that counts, in standard deviations.
 const MOST: f64 = 3.5;
-/// Steps of the search for the levels of the two spectra.
-const STEPS: usize = 200;
 /// Least level of a line, as a share of the mean: of the shared part a transform may be below 0 by rounding.
 const LEAST: f64 = 1e-3;
 
@@ -54,15 +52,16 @@ pub(super) fn swing(
     for (shot, z) in shots.iter().zip(&inner) {
         signal[(shot.chirp - first) as usize] += z - mean;
     }
-    let lines: Vec<f64> = transform(&signal).map(|line| line.norm_sqr() / count).collect();
+    let lines: Vec<f64> = lines_of(&signal).map(|line| line.norm_sqr() / count).collect();
     if lines.len() <= 2 * AROUND {
         return None;
     }
     let background = if shared.is_any() {
         let by_lag = shared.by_lag(shots, places);
         let of_shared: Vec<f64> =
-            transform(&by_lag).map(|line| (line.re / count).max(LEAST)).collect();
-        levels(&lines, &of_shared)
+            lines_of(&by_lag).map(|line| (line.re / count).max(LEAST)).collect();
+        let weights = weights(&lines, &of_shared);
+        of_shared.iter().map(|shared| level(weights, *shared)).collect()
     } else {
         vec![1.0; lines.len()]
     };
@@ -78,36 +77,8 @@ pub(super) fn swing(
 }
 
 /// The lines of a signal's spectrum, but for its mean and the highest of an even number of places, which is real.
-fn transform(signal: &[f64]) -> impl Iterator<Item = Complex<f64>> {
-    let places = signal.len();
-    let mut lines: Vec<Complex<f64>> = signal.iter().map(|value| Complex::from(*value)).collect();
-    FftPlanner::new().plan_fft_forward(places).process(&mut lines);
-    lines.into_iter().skip(1).take(places.saturating_sub(1) / 2)
-}
-
-/// The likeliest mean of every line as a sum of a flat spectrum and another one, by multiplicative steps (Févotte, Bertin
-/// & Durrieu 2009, DOI 10.1162/neco.2008.04-08-771).
-fn levels(lines: &[f64], of_shared: &[f64]) -> Vec<f64> {
-    let mut weights = [0.5; 2];
-    for _ in 0..STEPS {
-        let [mut more, mut less] = [[0.0; 2]; 2];
-        for (line, shared) in lines.iter().zip(of_shared) {
-            let level = level(weights, *shared);
-            for (part, share) in [1.0, *shared].into_iter().enumerate() {
-                more[part] += share * line / (level * level);
-                less[part] += share / level;
-            }
-        }
-        for part in 0..2 {
-            weights[part] *= more[part] / less[part];
-        }
-    }
-    of_shared.iter().map(|shared| level(weights, *shared)).collect()
-}
-
-/// Level of a line from those of a flat spectrum and of the shared one.
-fn level([flat, of_shared]: [f64; 2], shared: f64) -> f64 {
-    (flat + of_shared * shared).max(f64::MIN_POSITIVE)
+fn lines_of(signal: &[f64]) -> impl Iterator<Item = Complex<f64>> {
+    transform(signal).into_iter().skip(1).take(signal.len().saturating_sub(1) / 2)
 }
 
 /// A line of the spectrum.

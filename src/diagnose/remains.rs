@@ -50,7 +50,9 @@ pub(super) fn find_unexplained(scorer: &Scorer, remainder: &Remainder) -> Vec<Re
     found.extend(residual::outliers(z, prediction, declared, observations, strays));
     let sd_db = scatter_db(prediction);
     let swing = scorer.swing(prediction, z);
-    found.extend(swing.filter(|swing| swing.strength_db >= scorer.least_structure_db(largest_db)));
+    let waves = scorer.waves(prediction, z);
+    let least_db = scorer.least_structure_db(largest_db);
+    found.extend(swing.into_iter().chain(waves).filter(|one| one.strength_db >= least_db));
     found.extend(residual::steps(observations));
     found.extend(residual::skewness(z, shared, sd_db));
     found.sort_by(|a, b| b.strength_db.total_cmp(&a.strength_db));

@@ -16,6 +16,7 @@ use super::settings::Diagnosis;
 use super::shared::SharedSpeckle;
 use super::size::Size;
 use super::space::Space;
+use super::waves;
 use crate::effects::{Prediction, Receiver};
 
 /// Share of the largest effect's size below which structure may be an error of that effect's form.
@@ -253,13 +254,21 @@ impl Scorer<'_> {
         found
     }
 
+    /// The waves of residuals over the target plane.
+    pub fn waves(&self, prediction: &Prediction, z: &[f64]) -> Option<ResidualStructure> {
+        waves::waves(z, self.problem.shots, self.spot_m(), scatter_db(prediction))
+    }
+
     /// The structure too fine for a field that neighbours in place or in time share beside a model, dB; 0 where chance
     /// explains it.
     pub fn fine_structure_db(&self, state: &State) -> f64 {
         let prediction = self.predict(state);
         let z = self.z(&prediction);
         let neighbours = Some(self.shared(&prediction, &z)).filter(|one| one.p_value < CHANCE);
-        let found = neighbours.into_iter().chain(self.swing(&prediction, &z));
+        let found = neighbours
+            .into_iter()
+            .chain(self.swing(&prediction, &z))
+            .chain(self.waves(&prediction, &z));
         found.map(|one| one.strength_db).fold(0.0, f64::max)
     }
 

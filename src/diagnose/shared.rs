@@ -277,17 +277,17 @@ fn kernel(measured: &[[f64; 3]]) -> [f64; 2] {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::radar::random::{Key, Purpose};
     use crate::radar::{Chirps, Radar};
 
     /// Chirps on a square grid with this step, m.
-    const STEP_M: f64 = 0.006;
-    const SIDE: usize = 100;
-    const SPOT_M: f64 = 0.016;
+    pub const STEP_M: f64 = 0.006;
+    pub const SIDE: usize = 100;
+    pub const SPOT_M: f64 = 0.016;
 
-    fn shots() -> Vec<Shot> {
+    pub fn shots() -> Vec<Shot> {
         let radar = Radar::default();
         let chirps = Chirps::draw(&radar, |_| Err("no file".to_owned())).unwrap();
         let at = |index: usize| STEP_M * index as f64;
@@ -300,7 +300,7 @@ mod tests {
     }
 
     /// White noise, convolved so that places d apart share exp(−2d²/w²); independent for w = 0.
-    fn field(width_m: f64, seed: u64) -> Vec<f64> {
+    pub fn field(width_m: f64, seed: u64) -> Vec<f64> {
         let noise: Vec<f64> = (0..SIDE * SIDE)
             .map(|index| {
                 let key = Key { seed, chirp: index as u64, sub_ray: 0, purpose: Purpose::Fit };

@@ -198,6 +198,10 @@ pub(super) fn covariate(name: &str) -> (String, &'static str) {
         "range residual" => {
             ("measured less expected range", "What is strong or weak also lies elsewhere in range.")
         }
+        "waves over the target" => (
+            "waves over the target",
+            "Something repeats over the surface, such as stripes or checkers.",
+        ),
         "neighbourhood" => {
             ("what neighbours share", "Something small and rough on the target has another power.")
         }
