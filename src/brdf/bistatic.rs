@@ -66,6 +66,24 @@ impl<'a> Bistatic<'a> {
     }
 }
 
+/// What is seen of each of some things by the numbers of their laws: `of_law` gives that of the things in its list, which
+/// all have one law.
+pub(crate) fn of_each_law(
+    laws: impl Iterator<Item = usize>,
+    of_law: impl Fn(usize, &[usize]) -> Vec<Seen>,
+) -> Vec<Seen> {
+    let laws: Vec<usize> = laws.collect();
+    let mut places: Vec<usize> = (0..laws.len()).collect();
+    places.sort_by_key(|&place| laws[place]);
+    let mut all = vec![Seen::default(); laws.len()];
+    for here in places.chunk_by(|&a, &b| laws[a] == laws[b]) {
+        for (&place, seen) in here.iter().zip(of_law(laws[here[0]], here)) {
+            all[place] = seen;
+        }
+    }
+    all
+}
+
 fn is_narrow(lobe: &Lobe) -> bool {
     matches!(lobe, Lobe::Facets { m, .. } if *m <= NARROW_M)
 }

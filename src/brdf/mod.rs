@@ -31,7 +31,7 @@ pub use albedo::{ALBEDO_SLACK, Excess, albedo, incidences_rad};
 pub(crate) use backscatter::Look;
 pub use backscatter::{Facets, Term};
 pub use beyond_beam::BeyondBeam;
-pub(crate) use bistatic::{Bistatic, Pair};
+pub(crate) use bistatic::{Bistatic, Pair, of_each_law};
 pub use kind::{Key, Kind};
 pub use lobe::Lobe;
 pub use models::*;

@@ -140,6 +140,14 @@ const SHARE_OF_GAIN_OF_SPREAD: f64 = 0.05;
 /// Largest gain per shot that measures how large an effect is. A larger one shows that something was out of place.
 const MOST_OF_A_SHOT: f64 = 2.0;
 
+/// Gain by false alarms alone, in least gains, from which they show an effect by themselves.
+const FAR_BEYOND_ALARMS: f64 = 4.0;
+
+/// Whether false alarms show an effect by themselves.
+pub(super) fn is_shown_by_alarms(of_alarms: f64, least: f64) -> bool {
+    of_alarms >= FAR_BEYOND_ALARMS * least
+}
+
 /// The largest size, dB, and the largest gain in ln likelihood among effects.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Largest {
@@ -154,6 +162,12 @@ impl Largest {
             size_db: size_db.max(one.size_db),
             gain: gain.max(one.gain),
         })
+    }
+
+    /// The largest of the others as far as it counts against an effect that gains so much by the false alarms alone. An
+    /// error of another effect's form changes no detection off the target.
+    pub fn beside(self, of_alarms: f64, least: f64) -> Largest {
+        if is_shown_by_alarms(of_alarms, least) { Largest::default() } else { self }
     }
 
     /// Gain below which another effect may only correct the form of the largest, on a scan of this many independent shots.
@@ -174,6 +188,9 @@ mod tests {
         assert!(is_near(Largest::default().least_gain(false, 18_529.0), 0.0));
         assert!(is_near(large.least_gain(false, 18_529.0), 758.0));
         assert!(is_near(large.least_gain(true, 18_529.0), 379.0));
+        // What false alarms show by themselves is no error of another effect's form.
+        let beside = |of_alarms: f64| large.beside(of_alarms, 5.0).least_gain(true, 18_529.0);
+        assert!(is_near(beside(19.0), 379.0) && is_near(beside(21.0), 0.0));
         // A pose far off gains without end at edges, which must not hide any other effect.
         let far = Largest { gain: 170_150.0, ..large };
         assert!(is_near(far.least_gain(false, 8_708.0), 1_741.6));

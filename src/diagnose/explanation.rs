@@ -57,14 +57,16 @@ impl<'a> Explanation<'a> {
         let State { space, fit, held_out } = &self.state;
         let without = scorer.without(&self.state, index);
         let loss = fit.ln_likelihood - without.fit.ln_likelihood;
+        let least = scorer.settings.least_gain_of(space.effects[index].parameters().len(), 1);
+        let of_alarms = scorer.gain_of_alarms(&without, space, &fit.at);
         let claim = Claim {
             gain: loss,
-            least: scorer.settings.least_gain_of(space.effects[index].parameters().len(), 1),
+            least,
             may_be_form: false,
             held_out: scorer.difference(held_out, &without.held_out),
             size: scorer.size(&without, space, &fit.at),
             share_of_size: SHARE_OF_LARGEST,
-            largest: self.largest(),
+            largest: self.largest().beside(of_alarms, least),
         };
         let is_needed = claim.is_supported(scorer.settings, scorer.problem.independent_shots());
         Removal { index, without, loss, is_needed }
@@ -95,9 +97,10 @@ impl<'a> Explanation<'a> {
         structure
     }
 
-    /// The effect of the smallest size.
+    /// The effect of the smallest size. Motions do not count: ranges and edges place a target, whatever its powers share.
     fn smallest(&self) -> Option<usize> {
         let sizes = self.added.iter().map(|one| one.evidence.size_db).enumerate();
+        let sizes = sizes.filter(|(index, _)| !self.state.space.effects[*index].moves());
         sizes.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(index, _)| index)
     }
 }

@@ -181,6 +181,12 @@ impl Scorer<'_> {
         HeldOut { shots, alarms: self.problem.ln_p_of_alarms(space, at) }
     }
 
+    /// Gain in ln p of the chirps that see no target, by a model with more effects.
+    pub fn gain_of_alarms(&self, state: &State, space: &Space, at: &DVector<f64>) -> f64 {
+        let before = self.problem.ln_p_of_alarms(&state.space, &state.fit.at);
+        self.problem.ln_p_of_alarms(space, at) - before
+    }
+
     /// Difference in ln p, and its standard error. A gain of g by one number has that of √2g.
     pub fn difference(&self, a: &HeldOut, b: &HeldOut) -> [f64; 2] {
         let pairs = a.shots.iter().zip(&b.shots);

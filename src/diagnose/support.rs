@@ -114,14 +114,16 @@ impl<'j, 'p, 'a> Judge<'j, 'p, 'a> {
         let Candidate { gain, numbers, .. } = trial.candidate;
         let (settings, shots) = (self.scorer.settings, self.scorer.problem.independent_shots());
         let is_spread = trial.size.is_spread();
+        let least = settings.least_gain_of(numbers, trial.tried);
+        let of_alarms = self.scorer.gain_of_alarms(self.state, &trial.space, &trial.fit.at);
         let mut claim = Claim {
             gain,
-            least: settings.least_gain_of(numbers, trial.tried),
+            least,
             may_be_form: !trial.effect.about().has_one_form,
             held_out: [f64::INFINITY, 0.0],
             size: trial.size,
             share_of_size: if is_spread { SHARE_OF_SPREAD } else { SHARE_OF_LARGEST },
-            largest: self.largest,
+            largest: self.largest.beside(of_alarms, least),
         };
         // Held-out patches take long and are computed only for trials that would pass without them.
         if !claim.is_supported(settings, shots) {

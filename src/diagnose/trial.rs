@@ -4,7 +4,7 @@
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::evidence::{Candidate, Largest};
+use super::evidence::{Candidate, Largest, is_shown_by_alarms};
 use super::problem::Sample;
 use super::ranges::place_by_ranges;
 use super::refit::{Fit, SCOUT, SEARCH};
@@ -200,11 +200,12 @@ impl<'p> Search<'p> {
         for trial in trials {
             let promised = trial.candidate.gain;
             let is_full = kept.len() == SHORTLIST && !kept.contains(&trial.key());
-            if promised < hopeless.max(SHARE_OF_BEST * best) {
-                break;
-            }
             let least = settings.least_gain_of(trial.candidate.numbers, trial.tried);
-            if is_full || promised < SHARE_OF_LEAST * least {
+            let of_alarms = self.scorer.gain_of_alarms(state, &trial.space, &trial.fit.at);
+            let is_behind = is_full || promised < hopeless.max(SHARE_OF_BEST * best);
+            if promised < SHARE_OF_LEAST * least
+                || is_behind && !is_shown_by_alarms(of_alarms, least)
+            {
                 continue;
             }
             (self.notify)(&format!("round {round}: refitting with {}", trial.effect.name()));

@@ -28,7 +28,7 @@ use super::setup::Setup;
 use super::sheet::Passage;
 use super::spot::{self, Footprints, Spot};
 use super::surface::Orientation;
-use crate::brdf::{Pair, Retro, Seen};
+use crate::brdf::{Pair, Retro, Seen, of_each_law};
 use crate::effects::MeanEcho;
 use crate::frames::{Direction, Surface as Local};
 use crate::radar::{Channel, Detection, Link};
@@ -233,7 +233,7 @@ impl<'a> Paths<'a> {
     /// What each point scatters towards the antenna, as it views them.
     fn seen(&self, points: &[LitPoint], views: &[View]) -> Vec<Seen> {
         let regions = points.iter().map(|point| self.light.region(&point.place.hit));
-        by_region(regions, |region, here| {
+        of_each_law(regions, |region, here| {
             let surface = &self.light.setup.surfaces[region];
             let of_each = here.iter().map(|&at| (&points[at].place, &views[at]));
             match self.retros.get(region) {
@@ -259,7 +259,7 @@ impl<'a> Paths<'a> {
             }
         }
         let regions = lit.onward.iter().map(|onward| self.light.region(&onward.place.hit));
-        let seen = by_region(regions, |region, here| {
+        let seen = of_each_law(regions, |region, here| {
             let of_each = here.iter().map(|&at| seconds[at].view.pair(&lit.onward[at].place));
             let surface = &self.light.setup.surfaces[region];
             surface.seen_by_each(&self.light.laws[region], of_each.collect())
@@ -553,21 +553,4 @@ struct Second {
     beam_share: f64,
     /// What it scatters towards the antenna.
     seen: Seen,
-}
-
-/// A value for each of some things from their regions: `of_region` gives those of the things in its list, which all lie in one.
-fn by_region(
-    regions: impl Iterator<Item = usize>,
-    of_region: impl Fn(usize, &[usize]) -> Vec<Seen>,
-) -> Vec<Seen> {
-    let regions: Vec<usize> = regions.collect();
-    let mut places: Vec<usize> = (0..regions.len()).collect();
-    places.sort_by_key(|&place| regions[place]);
-    let mut all = vec![Seen::default(); regions.len()];
-    for here in places.chunk_by(|&a, &b| regions[a] == regions[b]) {
-        for (&place, seen) in here.iter().zip(of_region(regions[here[0]], here)) {
-            all[place] = seen;
-        }
-    }
-    all
 }

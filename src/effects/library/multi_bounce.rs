@@ -13,7 +13,9 @@ use std::f64::consts::PI;
 
 use rayon::prelude::*;
 
-use crate::brdf::{Brdf, Distribution, NarrowLobe, Scattering, Seen};
+use crate::brdf::{
+    Bistatic, Brdf, Distribution, NarrowLobe, Pair, Scattering, Seen, of_each_law,
+};
 use crate::effects::echo::MeanEcho;
 use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level, Setting, Survey};
 use crate::effects::intersection::{local_frame, shot_along};
@@ -55,6 +57,8 @@ const LOBES: [f64; 2] = [0.25, 0.08];
 const OUTSIDE_SPOT: f64 = 0.01;
 /// The cosine and the lobes.
 const KINDS: usize = 1 + LOBES.len();
+/// Shots whose paths are shaded together.
+const SHOTS_PER_TASK: usize = 16;
 /// A ray starts this far from its surface, m, so that the surface does not block it.
 const CLEARANCE_M: f64 = 1e-6;
 
@@ -109,37 +113,43 @@ struct Detour {
 }
 
 impl Detour {
-    /// Power received, W, and the part of it that is one wave.
-    fn powers_w(&self, laws: &[Brdf], in_phase: bool) -> [f64; 2] {
+    /// The look at the first surface, and at the second one by way of a lobe of the roughness m.
+    fn looks(&self, m: f64) -> [Pair; 2] {
+        let look = |beam_rad, [i, o]: [Direction<Surface>; 2]| Pair { beam_rad, i, o };
+        [look(0.0, self.first), look(self.beam_rad.hypot(m), self.second)]
+    }
+
+    /// Power received, W, and the part of it that is one wave, by what is seen of both surfaces.
+    fn drawn_w(&self, [first, second]: [Seen; 2], in_phase: bool) -> [f64; 2] {
+        let sent_w = self.watts * first.f_per_sr;
+        received_per_sr([first, second], 1.0, in_phase).map(|f| sent_w * f)
+    }
+
+    /// The same by way of the narrow lobes of the first surface.
+    fn mirrored_w(&self, laws: &[Brdf], in_phase: bool) -> [f64; 2] {
         let [first, second] = self.regions.map(|region| laws.get(usize::from(region)));
         let (Some(first), Some(second)) = (first, second) else { return [0.0; 2] };
-        let [i, o] = self.first;
-        if !self.is_mirrored {
-            let first = first.apart_from_narrow_lobes(i, o);
-            let sent_w = self.watts * first.f_per_sr;
-            return self.received_per_sr(second, first, 0.0, in_phase).map(|f| sent_w * f);
-        }
         let mut powers_w = [0.0; 2];
-        for NarrowLobe { share, m } in first.narrow_lobes(i) {
-            let received = self.received_per_sr(second, Seen::mirror(0.0), m, in_phase);
+        for NarrowLobe { share, m } in first.narrow_lobes(self.first[0]) {
+            let [_, Pair { beam_rad, i, o }] = self.looks(m);
+            let narrowed = (self.beam_rad / beam_rad).powi(2);
+            let seen = [Seen::mirror(0.0), second.seen_by(beam_rad, i, o)];
+            let received = received_per_sr(seen, narrowed, in_phase);
             for (power_w, f_per_sr) in powers_w.iter_mut().zip(received) {
                 *power_w += self.watts * share * f_per_sr;
             }
         }
         powers_w
     }
+}
 
-    /// f of the second surface, 1/sr, as the beam sees it by way of a lobe of the roughness m, with what the same way round
-    /// the other way adds; and the part of it that is one wave.
-    fn received_per_sr(&self, law: &Brdf, first: Seen, m: f64, in_phase: bool) -> [f64; 2] {
-        let ([i, o], beam_rad) = (self.second, self.beam_rad.hypot(m));
-        let last = law.seen_by(beam_rad, i, o);
-        let narrowed = (self.beam_rad / beam_rad).powi(2);
-        let coherent_share = first.coherent_share * last.coherent_share * narrowed;
-        // The coherent part is one wave already.
-        let enhancement = if in_phase { 2.0 - coherent_share } else { 1.0 };
-        [last.f_per_sr * enhancement, last.f_per_sr * coherent_share]
-    }
+/// f of the second surface, 1/sr, with what the same way round the other way adds; and the part of it that is one wave, of which
+/// a lobe of the first surface leaves the share `narrowed`.
+fn received_per_sr([first, last]: [Seen; 2], narrowed: f64, in_phase: bool) -> [f64; 2] {
+    let coherent_share = first.coherent_share * last.coherent_share * narrowed;
+    // The coherent part is one wave already.
+    let enhancement = if in_phase { 2.0 - coherent_share } else { 1.0 };
+    [last.f_per_sr * enhancement, last.f_per_sr * coherent_share]
 }
 
 /// The path of a ray from the first surface to a second one that the radar sees. The density is that of the
@@ -213,9 +223,8 @@ struct Bounce {
 }
 
 impl Bounce {
-    fn new(laws: &[Brdf], detour: &Detour, in_phase: bool) -> Bounce {
+    fn new(detour: &Detour, [power_w, coherent_w]: [f64; 2]) -> Bounce {
         let Detour { pattern, beside_m, range_m, .. } = *detour;
-        let [power_w, coherent_w] = detour.powers_w(laws, in_phase);
         let coherent_share = if power_w > 0.0 { coherent_w / power_w } else { 0.0 };
         let echo = MeanEcho { coherent_share, ..MeanEcho::at_once(power_w, range_m) };
         Bounce { echo, pattern, beside_m }
@@ -229,6 +238,35 @@ impl Bounce {
         }
         MeanEcho { power_w: seen * self.echo.power_w, ..self.echo }
     }
+}
+
+/// What the paths of some shots return. The laws are evaluated at once for all directions that were drawn.
+fn bounces<'a>(
+    of_shots: &[Vec<Detour>],
+    laws: &[Brdf],
+    each: &[Bistatic<'a>],
+    in_phase: bool,
+) -> Vec<Vec<Bounce>> {
+    let drawn: Vec<&Detour> = of_shots.iter().flatten().filter(|one| !one.is_mirrored).collect();
+    let seen = |surface: usize, seen_by: fn(&Bistatic<'a>, &[Pair]) -> Vec<Seen>| {
+        let regions = drawn.iter().map(|one| usize::from(one.regions[surface]));
+        of_each_law(regions, |law, here| {
+            let looks: Vec<Pair> = here.iter().map(|&at| drawn[at].looks(0.0)[surface]).collect();
+            each.get(law).map_or(Vec::new(), |law| seen_by(law, &looks))
+        })
+    };
+    let (first, second) = (seen(0, Bistatic::apart_from_narrow_lobes), seen(1, Bistatic::seen));
+    let mut of_drawn = first.into_iter().zip(second);
+    let mut bounce = |detour: &Detour| {
+        let powers_w = if detour.is_mirrored {
+            detour.mirrored_w(laws, in_phase)
+        } else {
+            let seen = of_drawn.next();
+            seen.map_or([0.0; 2], |(a, b)| detour.drawn_w([a, b], in_phase))
+        };
+        Bounce::new(detour, powers_w)
+    };
+    of_shots.iter().map(|detours| detours.iter().map(&mut bounce).collect()).collect()
 }
 
 const ABOUT: About = About {
@@ -338,10 +376,10 @@ impl Effect for SecondBounce {
 
     fn shade(&self, survey: &Survey, laws: &[Brdf]) -> Survey {
         let all = survey.downcast_ref::<Vec<Vec<Detour>>>().map_or(&[][..], Vec::as_slice);
-        let of_shot = |detours: &Vec<Detour>| {
-            detours.iter().map(|one| Bounce::new(laws, one, self.in_phase)).collect()
-        };
-        Box::new(all.par_iter().map(of_shot).collect::<Vec<Vec<Bounce>>>())
+        let each: Vec<Bistatic> = laws.iter().map(|law| Bistatic::new(law)).collect();
+        let tasks = all.par_chunks(SHOTS_PER_TASK);
+        let bounces = tasks.flat_map_iter(|of_shots| bounces(of_shots, laws, &each, self.in_phase));
+        Box::new(bounces.collect::<Vec<Vec<Bounce>>>())
     }
 
     fn arrive(&self, _: &[f64], shaded: &Survey, arrived: &mut [Option<MeanEcho>]) {
