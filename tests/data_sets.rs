@@ -226,13 +226,52 @@ fn repeats_differ_in_noise_alone_and_splits_share_no_object() {
     let text = fs::read_to_string(&manifest).unwrap();
     let of_train =
         rows.iter().find(|row| row["split"] == "train").unwrap()["options"]["object"].clone();
-    let mut changed: Value = serde_json::from_str(&text).unwrap();
-    changed["scans"][0]["options"]["object"] = of_train.clone();
-    fs::write(&manifest, changed.to_string()).unwrap();
+    let own = serde_json::from_str::<Value>(&text).unwrap()["scans"][0]["options"].to_string();
+    let other = own.replace(own.split('"').nth(3).unwrap(), of_train.as_str().unwrap());
+    let changed = text.replacen(&own, &other, 1);
+    assert_ne!(changed, text);
+    fs::write(&manifest, &changed).unwrap();
+    let problem = refused(here, &["dataset", "check", "ds"]);
+    assert!(problem.contains("is not complete"), "{problem}");
+    fs::write(&manifest, sealed(&changed)).unwrap();
     let output = matdb(here).args(["dataset", "check", "ds"]).output().unwrap();
     let found = String::from_utf8_lossy(&output.stdout).into_owned();
     let leak = format!("option `{}` of `object` is in test and train", of_train.as_str().unwrap());
     assert!(found.contains(&leak), "{found}");
+}
+
+/// A manifest with the seal that belongs to it.
+fn sealed(manifest: &str) -> String {
+    let (all, _) = manifest.split_once("\"seal\":\"").unwrap();
+    let seal = |seal: &str| format!("{all}\"seal\":\"{seal}\"}}");
+    seal(blake3::hash(seal("").as_bytes()).to_hex().as_str())
+}
+
+/// A wall that most of the scans do not meet where it is drawn first.
+#[test]
+fn a_scan_that_no_ray_hits_is_drawn_again() {
+    let root = tempfile::tempdir().unwrap();
+    let here = root.path();
+    let wall = SCENE.split("[[mesh]]\nname = \"plate\"").next().unwrap();
+    let scene = format!("{wall}[[region]]\nname = \"wall\"\nmaterial = \"mannequin-paint\"\n");
+    fs::write(here.join("scene.toml"), scene).unwrap();
+    let spec = "name = \"walls\"\nscene = \"scene.toml\"\nscans = 8\nseed = 5\n[[vary]]\n\
+                keys = [\"mesh.wall.translation_m\"]\nfrom = [-1.5, 1.1, -0.1]\nto = [1.5, 1.1, -0.1]\n";
+    fs::write(here.join("spec.toml"), spec).unwrap();
+    said(here, &["dataset", "run", "spec.toml", "-o", "ds"]);
+    let manifest = fs::read(here.join("ds/manifests/train-00000-of-00001.json")).unwrap();
+    let manifest: Value = serde_json::from_slice(&manifest).unwrap();
+    let scans = manifest["scans"].as_array().unwrap();
+    assert_eq!(scans.len(), 8);
+    for scan in scans {
+        assert!(scan["hits"].as_u64().unwrap() > 0);
+        let x_m = scan["numbers"]["mesh.wall.translation_m.0"].as_f64().unwrap();
+        assert!(x_m.abs() < 0.6, "{x_m}");
+    }
+    // Where nothing else can be drawn the scan is named.
+    fs::write(here.join("spec.toml"), spec.replace("from = [-1.5", "from = [1.4")).unwrap();
+    let problem = refused(here, &["dataset", "run", "spec.toml", "-o", "other"]);
+    assert!(problem.starts_with("scan train-00000"), "{problem}");
 }
 
 #[test]
@@ -332,6 +371,34 @@ fn what_cannot_be_is_refused_before_the_first_scan() {
         (
             format!("{SPEC}{posterior}{posterior}"),
             "two [[posterior]] are of `aluminium`; leave one out",
+        ),
+        (
+            format!("{SPEC}[[vary]]\nkeys = [\"radar.threshold_dbm\"]\nvalues = [-80, \"-70\"]\n"),
+            "values has -80 and \"-70\", of two kinds; give numbers alone",
+        ),
+        (
+            format!("{SPEC}[[place]]\nmesh = \"plate\"\non = \"wall\"\n"),
+            "by [[place]] of `plate` and by [[place]] of `plate`",
+        ),
+        (
+            SPEC.replace("\"radar.system_loss_db\"", "' mesh.\"plate\". size_m '"),
+            "is drawn twice, by [[choose]] `object` and by [[vary]]",
+        ),
+        (
+            SPEC.replace("[0.06, 0.06, 0.03]", "[0.070, 7e-2, 0.01]"),
+            "the splits leak: two options of [[choose]] `object` set the same",
+        ),
+        (
+            SPEC.replace("scans = 20", "scans = 20000").replace("repeats = 2", "repeats = 20000"),
+            "repeats = 20000; give 10 000 at most",
+        ),
+        (
+            SPEC.replace("train = 0.6", "train = 1e308"),
+            "; give shares above 0, such as 0.8 and 0.2",
+        ),
+        (
+            format!("{SPEC}[[effect]]\nname = \"drift\"\nparameters = {{ slope_db = [0, 1] }}\n"),
+            "two [[effect]] are `drift`; leave one out",
         ),
         // The plate stands outside the field of view.
         (

@@ -89,6 +89,13 @@ impl EffectLaw {
                     format!("give values from {} to {}", known.min, known.max),
                 ));
             }
+            if let Law::Normal { mean, .. } = law
+                && !(known.min..=known.max).contains(&mean)
+            {
+                let problem = format!("the report states {name} = {mean}, which is out of range");
+                let way_out = format!("give values from {} to {}", known.min, known.max);
+                return Err(refused(&place, problem, way_out));
+            }
             numbers.push((name, law, [known.min, known.max]));
         }
         let (share, material) = (draw.share, draw.material.clone());
@@ -133,6 +140,10 @@ fn stated(report: &str, copy: Option<&PathBuf>, name: &str) -> Result<Vec<(Strin
             let problem = format!("states no standard deviation of {parameter} of `{name}`");
             return Err(refused(report, problem, "give parameters with their ends in its place"));
         };
+        if !(sd.is_finite() && sd >= 0.0 && mean.is_finite()) {
+            let problem = format!("states {parameter} = {mean} ± {sd} of `{name}`");
+            return Err(refused(report, problem, "give parameters with their ends in its place"));
+        }
         laws.push((parameter.clone(), Law::Normal { mean, sd }));
     }
     if laws.is_empty() {

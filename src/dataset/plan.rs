@@ -12,7 +12,7 @@ use super::layout::{INPUTS, MATERIALS, PLAN, SCENE, SPEC};
 use super::recipe::Recipe;
 use super::scan::MadeScan;
 use super::shard::{ShardFiles, write_inside};
-use super::spec::{Spec, at, format_error};
+use super::spec::{Spec, alike, at, format_error};
 use crate::error::Error;
 use crate::files::{read_small, read_whole};
 use crate::formats::text::{from_toml, to_toml};
@@ -355,10 +355,7 @@ fn check_files(recipe: &Recipe, gathered: &Gathered) -> Result<(), Error> {
         for option in &choice.option {
             let set = option.set.iter().map(|(key, value)| {
                 let hash = value.as_str().and_then(|name| hashes.get(name));
-                format!(
-                    "{key}={}",
-                    hash.map_or_else(|| value.to_string(), |hash| (*hash).to_owned())
-                )
+                format!("{key}={}", hash.map_or_else(|| alike(value), |hash| (*hash).to_owned()))
             });
             let set = set.collect::<Vec<_>>().join(" ");
             if let Some(other) = known.insert(set, &option.name) {

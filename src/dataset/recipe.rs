@@ -120,12 +120,28 @@ impl Recipe {
     /// # Errors
     /// A scene that cannot be, by the scan's name.
     pub fn target(&self, scan: u32) -> Result<Target, Error> {
-        // Numbers may be what no scene can have, or leave no place for a mesh.
+        self.first_that(scan, Ok)
+    }
+
+    /// What `of` makes of the first target that it can be made of.
+    ///
+    /// # Errors
+    /// Why it cannot be made of the first of all, by the scan's name.
+    pub fn first_that<T>(
+        &self,
+        scan: u32,
+        of: impl Fn(Target) -> Result<T, Error>,
+    ) -> Result<T, Error> {
+        // Numbers may be what no scene can have, leave no place for a mesh, or move the target out of view.
         let is_random = !self.spec.vary.is_empty() || !self.spec.place.is_empty();
         let more = if is_random { MOST_ATTEMPTS } else { 0 };
-        let made = self.attempt(scan, 0).or_else(|error| {
-            (1..=more).find_map(|attempt| self.attempt(scan, attempt).ok()).ok_or(error)
-        });
+        let mut made = self.attempt(scan, 0).and_then(&of);
+        for attempt in 1..=more {
+            if made.is_ok() {
+                break;
+            }
+            made = self.attempt(scan, attempt).and_then(&of).or(made);
+        }
         made.map_err(|error| at(format!("scan {}", self.key(scan)), &error))
     }
 

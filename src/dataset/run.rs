@@ -47,6 +47,23 @@ pub(super) struct Manifest {
     pub split: String,
     pub files: Vec<ShardFile>,
     pub scans: Vec<ScanRow>,
+    /// BLAKE3 of all of the above: what was changed by hand is not believed.
+    pub seal: String,
+}
+
+impl Manifest {
+    /// The text of a file with its seal.
+    fn sealed(mut self) -> Result<Vec<u8>, Error> {
+        self.seal = String::new();
+        self.seal = blake3::hash(&self.text()?).to_hex().to_string();
+        self.text()
+    }
+
+    fn text(&self) -> Result<Vec<u8>, Error> {
+        serde_json::to_vec(self).map_err(|error| {
+            Error::usage(format!("a manifest cannot be written: {error}"), "report this")
+        })
+    }
 }
 
 /// A file of a shard.
@@ -194,10 +211,9 @@ impl Dataset {
             split: split.name.clone(),
             files: described.collect(),
             scans: made.into_iter().map(|scan| scan.record).collect(),
+            seal: String::new(),
         };
-        let text = serde_json::to_vec(&manifest).map_err(|error| {
-            Error::usage(format!("a manifest cannot be written: {error}"), "report this")
-        })?;
+        let text = manifest.sealed()?;
         self.write(&files)?;
         self.write(&[(layout::manifest(&name), text)])
     }
@@ -219,6 +235,9 @@ impl Dataset {
             .map_err(|error| format!("has a manifest that cannot be read: {error}"))?;
         if manifest.id != self.plan.id || manifest.shard != shard {
             return Err("is of another plan".to_owned());
+        }
+        if manifest.clone().sealed().ok() != Some(bytes) {
+            return Err("has a manifest that was changed".to_owned());
         }
         let split = &self.recipe.split_of_shard(shard).name;
         let mut files = vec![layout::points(&name)];
@@ -261,7 +280,7 @@ impl Dataset {
 
     /// Refuses a disk that cannot hold more scans.
     fn check_disk(&self, scans: u32) -> Result<(), Error> {
-        let needed = u64::from(scans) * self.plan.bytes_per_scan;
+        let needed = u64::from(scans).saturating_mul(self.plan.bytes_per_scan);
         match free_bytes(&self.folder) {
             Some(free) if free < needed => Err(Error::usage(
                 format!(

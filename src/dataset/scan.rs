@@ -55,7 +55,11 @@ impl Recipe {
     /// # Errors
     /// A scene that cannot be, or cannot be rendered, by the scan's name.
     pub fn make(&self, number: u32) -> Result<MadeScan, Error> {
-        let Target { ready, drawn, placed } = self.target(number)?;
+        self.first_that(number, |target| self.made(number, target))
+    }
+
+    fn made(&self, number: u32, target: Target) -> Result<MadeScan, Error> {
+        let Target { ready, drawn, placed } = target;
         let assembly = ready.assemble();
         let setup = assembly.setup();
         let footprints = assembly.trace(&setup, &|_| ())?;

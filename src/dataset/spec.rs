@@ -35,8 +35,8 @@ use toml::Value;
 use crate::error::Error;
 use crate::formats::FormatError;
 use crate::formats::text::from_toml;
-use crate::scene::SceneError;
 use crate::scene::file::BoxEntry;
+use crate::scene::{KeyChange, SceneError};
 
 /// A data set as its file describes it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -214,6 +214,10 @@ pub struct EffectDraw {
     pub material: Option<String>,
 }
 
+/// Most scans of a target, which are in one shard.
+const MOST_REPEATS: u32 = 10_000;
+/// Largest share of a split: only ratios count.
+const MOST_SHARE: f64 = 1e9;
 /// Most scans of a data set.
 const MOST_SCANS: u32 = 10_000_000;
 
@@ -273,6 +277,10 @@ impl Spec {
             let problem = format!("scans_per_shard = {}", self.scans_per_shard);
             return Err((problem, "give 1 to 10 000; a shard is kept in memory until it is whole"));
         }
+        if self.repeats > MOST_REPEATS {
+            let problem = format!("repeats = {}", self.repeats);
+            return Err((problem, "give 10 000 at most: those of a target are in one shard"));
+        }
         if self.repeats == 0 || !self.scans.is_multiple_of(self.repeats) {
             let problem = format!("repeats = {} of {} scans", self.repeats, self.scans);
             return Err((problem, "give a number that divides the scans"));
@@ -297,13 +305,21 @@ impl Spec {
                 return Err((problem, "give 0 to 100; 1 is the fit's own covariance"));
             }
         }
-        self.effect.iter().try_for_each(EffectDraw::check)
+        let mut drawn = BTreeSet::new();
+        for effect in &self.effect {
+            effect.check()?;
+            if !drawn.insert((&effect.name, &effect.material)) {
+                let problem = format!("two [[effect]] are `{}`", effect.name);
+                return Err((problem, "leave one out"));
+            }
+        }
+        Ok(())
     }
 
     fn check_splits(&self) -> Result<(), (String, &'static str)> {
         for (name, share) in &self.split {
             check_name("split", name)?;
-            if !(*share > 0.0 && share.is_finite()) {
+            if !(*share > 0.0 && *share <= MOST_SHARE) {
                 let problem = format!("split `{name}` has a share of {share}");
                 return Err((problem, "give shares above 0, such as 0.8 and 0.2"));
             }
@@ -320,36 +336,29 @@ impl Spec {
 
     /// Refuses keys that are drawn twice: one of the draws would be recorded and have no effect.
     fn check_keys(&self) -> Result<(), (String, &'static str)> {
-        let mut by: BTreeMap<&str, String> =
-            ["seed", "noise_seed"].map(|key| (key, "every scan".to_owned())).into();
-        let placed: Vec<[String; 2]> = self
-            .place
-            .iter()
-            .map(|one| {
-                ["rotation_deg", "translation_m"].map(|key| format!("mesh.{}.{key}", one.mesh))
+        let of_scans = ["seed", "noise_seed"].map(|key| (key.to_owned(), "every scan".to_owned()));
+        let of_places = self.place.iter().flat_map(|Placing { mesh, .. }| {
+            ["rotation_deg", "translation_m"].map(|key| {
+                let mesh_key = format!("mesh.{}.{key}", Value::from(mesh.as_str()));
+                (mesh_key, format!("[[place]] of `{mesh}`"))
             })
-            .collect();
-        for (key, placing) in placed
-            .iter()
-            .zip(&self.place)
-            .flat_map(|(keys, one)| keys.iter().map(move |key| (key, one)))
-        {
-            by.insert(key, format!("[[place]] of `{}`", placing.mesh));
-        }
+        });
         let of_choices = self.choose.iter().flat_map(|choice| {
-            let keys: BTreeSet<&str> = choice
-                .option
-                .iter()
-                .flat_map(|option| option.set.keys())
-                .map(|key| key.trim())
-                .collect();
-            keys.into_iter().map(move |key| (key, format!("[[choose]] `{}`", choice.name)))
+            let options = choice.option.iter();
+            let keys: BTreeSet<&String> = options.flat_map(|option| option.set.keys()).collect();
+            keys.into_iter().map(|key| (key.clone(), format!("[[choose]] `{}`", choice.name)))
         });
         let of_numbers = self.vary.iter().flat_map(|variation| {
-            variation.keys.iter().map(|key| (key.trim(), "[[vary]]".to_owned()))
+            variation.keys.iter().map(|key| (key.clone(), "[[vary]]".to_owned()))
         });
-        for (key, entry) in of_choices.chain(of_numbers) {
-            if let Some(other) = by.insert(key, entry.clone()) {
+        let mut by: BTreeMap<Vec<String>, String> = BTreeMap::new();
+        for (key, entry) in
+            of_scans.into_iter().chain(of_places).chain(of_choices).chain(of_numbers)
+        {
+            // One key has several spellings. What is no key is refused where the scene is read.
+            let path = KeyChange::new(&key, 0).map_or_else(|_| vec![key.clone()], |key| key.path());
+            if let Some(other) = by.insert(path, entry.clone()) {
+                let key = key.trim();
                 let problem = format!("`{key}` is drawn twice, by {other} and by {entry}");
                 return Err((problem, "leave it out of one of them"));
             }
@@ -405,7 +414,10 @@ impl Spec {
                     "give each split an option, or more options without a split",
                 ));
             }
-            let sets = option.iter().map(|one| format!("{:?}", one.set));
+            let sets = option.iter().map(|one| {
+                let set = one.set.iter().map(|(key, value)| (key.trim(), alike(value)));
+                set.collect::<Vec<_>>()
+            });
             if *apart && sets.collect::<BTreeSet<_>>().len() < option.len() {
                 let problem =
                     format!("the splits leak: two options of [[choose]] `{name}` set the same");
@@ -462,7 +474,13 @@ impl Variation {
                     "give as many numbers in both and in from and to, sd 0 or more, the smaller ends in from",
                 ))
             }
-            (None, None, None, None, [_, ..]) => Ok(()),
+            (None, None, None, None, [first, others @ ..]) => {
+                let Some(other) = others.iter().find(|other| !is_of_one_kind(first, other)) else {
+                    return Ok(());
+                };
+                let problem = format!("values has {first} and {other}, of two kinds");
+                Err((problem, "give numbers alone, texts alone, or lists of one form"))
+            }
             _ => Err(("says not one way to draw".to_owned(), WAYS)),
         }
     }
@@ -536,6 +554,34 @@ impl EffectDraw {
         }
         Ok(())
     }
+}
+
+/// A value as it is compared with others: a whole number is that of a float.
+pub(super) fn alike(value: &Value) -> String {
+    match value {
+        Value::Integer(number) => (*number as f64).to_string(),
+        Value::Float(number) => number.to_string(),
+        Value::Array(values) => {
+            let values: Vec<String> = values.iter().map(alike).collect();
+            format!("[{}]", values.join(", "))
+        }
+        other => other.to_string(),
+    }
+}
+
+/// Whether two values go into the same columns of a table: numbers, texts, or as many of each in the same order.
+fn is_of_one_kind(a: &Value, b: &Value) -> bool {
+    match (a, b) {
+        (Value::Array(a), Value::Array(b)) => {
+            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| is_of_one_kind(a, b))
+        }
+        (Value::Array(_), _) | (_, Value::Array(_)) => false,
+        _ => is_number(a) == is_number(b),
+    }
+}
+
+fn is_number(value: &Value) -> bool {
+    matches!(value, Value::Integer(_) | Value::Float(_))
 }
 
 /// A refusal with its place.

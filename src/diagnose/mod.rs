@@ -71,6 +71,8 @@ mod subject;
 mod support;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod testing;
 mod told;
 mod trial;
 mod unresolved;

@@ -117,10 +117,10 @@ impl Raster {
         // A line of shots is long and narrow.
         let cell_m =
             (spot_m / PER_SPOT).max(coarsest_m).max(extent_m[0].max(extent_m[1]) / MOST_CELLS);
-        let number = |m: f64| (m / cell_m).round() as usize;
-        let [wide, high] = extent_m.map(|m| PADDING * (number(m) + 1));
-        let cell = |place: &[f64; 2]| number(place[1] - low[1]) * wide + number(place[0] - low[0]);
-        let cells = places.iter().map(cell).collect();
+        let [wide, high] = extent_m.map(|m| PADDING * (steps(m, cell_m) + 1));
+        let rows_and_columns =
+            places.iter().map(|[x, y]| [y - low[1], x - low[0]].map(|m| steps(m, cell_m)));
+        let cells = rows_and_columns.map(|[row, column]| row * wide + column).collect();
         Raster { cells, wide, high, cell_m, spot_m }
     }
 
@@ -151,51 +151,51 @@ impl Raster {
         let mean = z.iter().sum::<f64>() / count;
         let residuals: Vec<f64> = z.iter().map(|z| z - mean).collect();
         let spectrum = transform_map(&self.map(&residuals), self.wide);
-        let power = |place: usize| spectrum[place].norm_sqr() / count;
-        let shortest = |spots: f64| {
-            let most_per_m = 1.0 / (spots * self.spot_m);
-            move |place: &usize| self.per_m(*place).is_some_and(|per_m| per_m < most_per_m)
-        };
-        let all = 0..spectrum.len();
-        // Every second line in each direction tells all that they do.
-        let is_apart = |place: &usize| {
-            (place % self.wide).is_multiple_of(PADDING)
-                && (place / self.wide).is_multiple_of(PADDING)
-        };
-        let of_levels: Vec<usize> =
-            all.clone().filter(is_apart).filter(shortest(SHORTEST_OF_LEVELS)).collect();
-        let powers: Vec<f64> = of_levels.iter().map(|place| power(*place)).collect();
-        let levels = self.levels(&of_levels, &powers);
-        let tested = all.filter(shortest(SHORTEST));
-        tested.map(|place| Line { place, power: power(place), level: levels[place] }).collect()
+        let powers: Vec<f64> = spectrum.iter().map(|line| line.norm_sqr() / count).collect();
+        // Every second line in each direction says all that they do.
+        let all = 0..powers.len();
+        let apart = all.clone().filter(|place| {
+            [place % self.wide, place / self.wide].iter().all(|steps| steps.is_multiple_of(PADDING))
+        });
+        let levels = self.levels(
+            &apart
+                .filter(|place| self.is_longer(*place, SHORTEST_OF_LEVELS))
+                .collect::<Vec<usize>>(),
+            &powers,
+        );
+        let tested = all.filter(|place| self.is_longer(*place, SHORTEST));
+        tested.map(|place| Line { place, power: powers[place], level: levels[place] }).collect()
     }
 
-    /// The likeliest level of every line, by the powers at some places.
+    /// Whether the waves of a line are longer than so many spots. The mean is none, and of a line and its conjugate one is.
+    fn is_longer(&self, place: usize, spots: f64) -> bool {
+        let [x, y] = self.steps(place);
+        let sides = [(x, self.wide), (y, self.high)];
+        let [x_per_m, y_per_m] =
+            sides.map(|(turns, all)| turns as f64 / (all as f64 * self.cell_m));
+        [x, y] > [0, 0] && x_per_m.hypot(y_per_m) < 1.0 / (spots * self.spot_m)
+    }
+
+    /// The likeliest level of every line, by those at some places.
     fn levels(&self, places: &[usize], powers: &[f64]) -> Vec<f64> {
         let pairs = self.pairs();
-        let count = self.cells.len() as f64;
-        let fit = |width: Option<f64>| {
-            let shared: Vec<f64> = match width {
-                Some(width) => self.shared(&pairs, width * self.spot_m, count),
+        let powers: Vec<f64> = places.iter().map(|place| powers[*place]).collect();
+        let widths: Vec<Option<u32>> = std::iter::once(None).chain(WIDTHS.map(Some)).collect();
+        let fits = widths.into_par_iter().map(|width| {
+            let shared = match width {
+                Some(steps) => self.shared(&pairs, WIDTH_STEP * f64::from(steps) * self.spot_m),
                 None => vec![1.0; pairs.len()],
             };
             let of_places: Vec<f64> = places.iter().map(|place| shared[*place]).collect();
-            let weights = weights(powers, &of_places);
-            let ln_p: f64 = powers
-                .iter()
-                .zip(&of_places)
-                .map(|(power, shared)| {
-                    let level = level(weights, *shared);
-                    -level.ln() - power / level
-                })
-                .sum();
+            let weights = weights(&powers, &of_places);
+            let levels = of_places.iter().map(|shared| level(weights, *shared));
+            let ln_p: f64 =
+                powers.iter().zip(levels).map(|(power, level)| -level.ln() - power / level).sum();
             (ln_p, shared.iter().map(|shared| level(weights, *shared)).collect::<Vec<f64>>())
-        };
-        let widths: Vec<Option<f64>> = std::iter::once(None)
-            .chain(WIDTHS.map(|step| Some(WIDTH_STEP * f64::from(step))))
-            .collect();
-        let fits: Vec<(f64, Vec<f64>)> = widths.into_par_iter().map(fit).collect();
-        let best = fits.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
+        });
+        // The first of equal ones, whatever the number of threads.
+        let fits: Vec<(f64, Vec<f64>)> = fits.collect();
+        let best = fits.into_iter().reduce(|a, b| if b.0 > a.0 { b } else { a });
         best.map(|(_, levels)| levels).unwrap_or_default()
     }
 
@@ -209,12 +209,13 @@ impl Raster {
     }
 
     /// The spectrum of speckle that is shared over a width, m.
-    fn shared(&self, pairs: &[f64], width_m: f64, count: f64) -> Vec<f64> {
-        let product = |(place, pairs): (usize, &f64)| {
+    fn shared(&self, pairs: &[f64], width_m: f64) -> Vec<f64> {
+        let count = self.cells.len() as f64;
+        let products = pairs.iter().enumerate().map(|(place, pairs)| {
             let [x, y] = self.steps(place).map(|steps| steps as f64 * self.cell_m);
             pairs * (-2.0 * (x * x + y * y) / (width_m * width_m)).exp()
-        };
-        let products: Vec<f64> = pairs.iter().enumerate().map(product).collect();
+        });
+        let products: Vec<f64> = products.collect();
         let spectrum = transform_map(&products, self.wide);
         spectrum.into_iter().map(|line| (line.re / count).max(LEAST)).collect()
     }
@@ -230,32 +231,27 @@ impl Raster {
 
     /// Steps to a place from the first in both directions, the shorter way round.
     fn steps(&self, place: usize) -> [i64; 2] {
-        let around = |steps: usize, all: usize| {
-            if 2 * steps > all { steps as i64 - all as i64 } else { steps as i64 }
-        };
-        [around(place % self.wide, self.wide), around(place / self.wide, self.high)]
-    }
-
-    /// Waves per metre of a line; none of one that is the conjugate of another, or the mean.
-    fn per_m(&self, place: usize) -> Option<f64> {
-        let [x, y] = self.steps(place);
-        let [x_per_m, y_per_m] = [(x, self.wide), (y, self.high)]
-            .map(|(turns, all)| turns as f64 / (all as f64 * self.cell_m));
-        ([x, y] > [0, 0]).then(|| x_per_m.hypot(y_per_m))
+        let sides = [(place % self.wide, self.wide), (place / self.wide, self.high)];
+        sides.map(|(steps, all)| steps as i64 - if 2 * steps > all { all as i64 } else { 0 })
     }
 
     /// Whether two lines belong to one wave.
     fn are_one_wave(&self, a: usize, b: usize) -> bool {
         let [a, b] = [a, b].map(|place| self.steps(place));
-        let is_near = |sign: i64| (0..2).all(|axis| (a[axis] - sign * b[axis]).abs() <= SAME_WAVE);
-        is_near(1) || is_near(-1)
+        let apart = [[a[0] - b[0], a[1] - b[1]], [a[0] + b[0], a[1] + b[1]]];
+        apart.iter().any(|apart| apart.iter().all(|steps| steps.abs() <= SAME_WAVE))
     }
+}
+
+/// Whole cells in a length, m.
+fn steps(m: f64, cell_m: f64) -> usize {
+    (m / cell_m).round() as usize
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::shared::tests::{SIDE, SPOT_M, STEP_M, field, shots};
+    use crate::diagnose::testing::{SIDE, SPOT_M, STEP_M, field, shots};
 
     /// The waves in residuals of which speckle has a width, with a pattern by place that is added.
     fn found(

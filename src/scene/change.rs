@@ -61,6 +61,11 @@ impl KeyChange {
         }
     }
 
+    /// The names of its tables and its own: the same of all spellings.
+    pub(crate) fn path(&self) -> Vec<String> {
+        self.tables.iter().chain([&self.last]).cloned().collect()
+    }
+
     /// Makes the change in a scene file's document.
     fn apply(&self, file: &mut Table) -> Result<(), FormatError> {
         let (mut table, mut passed) = (file, 0);

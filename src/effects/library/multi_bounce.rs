@@ -115,8 +115,8 @@ struct Detour {
 impl Detour {
     /// The look at the first surface, and at the second one by way of a lobe of the roughness m.
     fn looks(&self, m: f64) -> [Pair; 2] {
-        let look = |beam_rad, [i, o]: [Direction<Surface>; 2]| Pair { beam_rad, i, o };
-        [look(0.0, self.first), look(self.beam_rad.hypot(m), self.second)]
+        [(0.0, self.first), (self.beam_rad.hypot(m), self.second)]
+            .map(|(beam_rad, [i, o])| Pair { beam_rad, i, o })
     }
 
     /// Power received, W, and the part of it that is one wave, by what is seen of both surfaces.
@@ -241,32 +241,38 @@ impl Bounce {
 }
 
 /// What the paths of some shots return. The laws are evaluated at once for all directions that were drawn.
-fn bounces<'a>(
+fn bounces(
     of_shots: &[Vec<Detour>],
     laws: &[Brdf],
-    each: &[Bistatic<'a>],
+    each: &[Bistatic],
     in_phase: bool,
 ) -> Vec<Vec<Bounce>> {
     let drawn: Vec<&Detour> = of_shots.iter().flatten().filter(|one| !one.is_mirrored).collect();
-    let seen = |surface: usize, seen_by: fn(&Bistatic<'a>, &[Pair]) -> Vec<Seen>| {
+    let [first, second] = [0, 1].map(|surface| {
         let regions = drawn.iter().map(|one| usize::from(one.regions[surface]));
         of_each_law(regions, |law, here| {
             let looks: Vec<Pair> = here.iter().map(|&at| drawn[at].looks(0.0)[surface]).collect();
-            each.get(law).map_or(Vec::new(), |law| seen_by(law, &looks))
+            match (each.get(law), surface) {
+                (None, _) => Vec::new(),
+                (Some(law), 0) => law.apart_from_narrow_lobes(&looks),
+                (Some(law), _) => law.seen(&looks),
+            }
         })
-    };
-    let (first, second) = (seen(0, Bistatic::apart_from_narrow_lobes), seen(1, Bistatic::seen));
+    });
     let mut of_drawn = first.into_iter().zip(second);
-    let mut bounce = |detour: &Detour| {
-        let powers_w = if detour.is_mirrored {
-            detour.mirrored_w(laws, in_phase)
-        } else {
-            let seen = of_drawn.next();
-            seen.map_or([0.0; 2], |(a, b)| detour.drawn_w([a, b], in_phase))
-        };
-        Bounce::new(detour, powers_w)
-    };
-    of_shots.iter().map(|detours| detours.iter().map(&mut bounce).collect()).collect()
+    let of_shots = of_shots.iter().map(|detours| {
+        let bounces = detours.iter().map(|detour| {
+            let powers_w = if detour.is_mirrored {
+                detour.mirrored_w(laws, in_phase)
+            } else {
+                let seen = of_drawn.next().unwrap_or_default();
+                detour.drawn_w(seen.into(), in_phase)
+            };
+            Bounce::new(detour, powers_w)
+        });
+        bounces.collect()
+    });
+    of_shots.collect()
 }
 
 const ABOUT: About = About {
