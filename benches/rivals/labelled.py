@@ -1,4 +1,5 @@
-"""Labelled scans by matdb beside Embree and numpy doing the same, each on one core: `labelled.py --matdb matdb --scans 8`.
+"""Labelled scans by matdb beside Embree and numpy doing the same, each on one core: `labelled.py --matdb matdb --scans 8`. With
+`--json` matdb makes them on two cores, too.
 
 Both make scans of `examples/datasets/torso.toml` with 64 rays a spot: they place the meshes, build a hierarchy, trace 18 529 spots to the
 first surface and on behind the cloth, evaluate a law for each hit and the loss of the cloth, add up, draw speckle, label each chirp, and
@@ -37,20 +38,22 @@ BODY, PLATE, SHIRT = range(3)
 def specification(folder, scans):
     """The example with so many scans, of 64 rays a spot."""
     for name in ("torso.toml", "concealed.toml"):
-        text = re.sub(r"^scans = .*", f"scans = {scans}", (EXAMPLES / name).read_text(), flags=re.M)
+        text = re.sub(r"^scans = .*", f"scans = {scans}\nscans_per_shard = {max(scans // 4, 1)}", (EXAMPLES / name).read_text(), flags=re.M)
         text = re.sub(r"^split = .*", "split = { train = 1.0 }", text, flags=re.M)
         (folder / name).write_text(re.sub(r"^rays = .*", f"rays = {RAYS}", text, flags=re.M))
     return folder / "concealed.toml"
 
 
-def by_matdb(matdb, folder, scans):
-    """CPU seconds for each scan, without the plan."""
-    subprocess.run([matdb, "-q", "dataset", "plan", specification(folder, scans), "-o", folder / "ds"], check=True)
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run([matdb, "-q", "dataset", "run", folder / "ds"], check=True)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+def by_matdb(matdb, folder, scans, cores=1):
+    """CPU seconds and seconds for each scan, without the plan."""
+    made = folder / f"ds-{cores}"
+    subprocess.run([matdb, "-q", "dataset", "plan", specification(folder, scans), "-o", made], check=True)
+    before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
+    subprocess.run([matdb, "-q", "dataset", "run", made], check=True, env=os.environ | {"RAYON_NUM_THREADS": str(cores)})
+    after, took_s = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic() - began
     # The first scan is made once more, to compare its bytes with those of the plan.
-    return (after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime) / (scans + 1)
+    cpu_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return [of_all / (scans + 1) for of_all in (cpu_s, took_s)]
 
 
 def meshes(matdb, folder):
@@ -163,7 +166,7 @@ class Other:
 
 def by_other(matdb, folder, scans):
     """CPU seconds for each scan."""
-    rows = parquet.read_table(next((folder / "ds" / "points").glob("*.parquet")), columns=["scan", "chirp", "xt_m", "yt_m"])
+    rows = parquet.read_table(next((folder / "ds-1" / "points").glob("*.parquet")), columns=["scan", "chirp", "xt_m", "yt_m"])
     rows = rows.to_pandas().query("scan == 0").drop_duplicates("chirp")
     other = Other(meshes(matdb, folder), rows[["xt_m", "yt_m"]].to_numpy(float))
     other.make(0, folder)
@@ -177,11 +180,17 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--matdb", default="matdb")
     parser.add_argument("--scans", type=int, default=8)
+    parser.add_argument("--json", action="store_true", help="one line of JSON, with the time on two cores")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         folder = Path(folder)
-        own = by_matdb(os.path.abspath(options.matdb), folder, options.scans)
-        other = by_other(os.path.abspath(options.matdb), folder, options.scans)
+        matdb = os.path.abspath(options.matdb)
+        own, took_s = by_matdb(matdb, folder, options.scans)
+        other = by_other(matdb, folder, options.scans)
+        if options.json:
+            of_two_s = by_matdb(matdb, folder, options.scans, cores=2)[1]
+            print(json.dumps({"scans": options.scans, "rays": RAYS, "matdb_cpu_s": own, "other_cpu_s": other, "s": [took_s, of_two_s]}))
+            return
     print(f"matdb {own:.3f} CPU-s a scan, Embree and numpy {other:.3f}: x {other / own:.2f}")
 
 

@@ -17,7 +17,7 @@ from page import page
 from programs import ROOT, build, cargo
 
 HERE = Path(__file__).resolve().parent
-PARTS = ["trace", "reshade", "registration", "fits", "render", "formats", "diagnosis", "store", "gpu"]
+PARTS = ["trace", "reshade", "registration", "fits", "render", "formats", "diagnosis", "datasets", "store", "gpu"]
 
 
 def main():
@@ -107,6 +107,10 @@ def measured(part, folder, quick):
         import diagnosis
 
         return diagnosis.measure(), {}
+    if part == "datasets":
+        import datasets
+
+        return datasets.measure(quick), {}
     if part == "gpu":
         import gpu
 
