@@ -416,7 +416,9 @@ fn few_closures_have_names() {
 }
 
 /// Benches and examples that start the program, each because the process itself is measured or judged.
-const STARTERS: [&str; 4] = [
+const STARTERS: [&str; 5] = [
+    // Time of a data set that the program makes, beside another program that makes one.
+    "benches/rivals/datasets.py",
     // Time and memory of the whole program, from its start to its end.
     "benches/rivals/profiling.py",
     "benches/rivals/rendering.py",

@@ -21,7 +21,7 @@ use super::scorer::{HeldOut, State};
 use super::settings::gain_of_starts;
 use super::space::Space;
 use super::support::{Judge, is_as_good};
-use super::trial::{Search, Trial};
+use super::trial::{Found, Search, Trial};
 use crate::effects::Effect;
 
 /// Effects of the last round that are tested for being real beside the strongest.
@@ -61,16 +61,17 @@ pub(super) fn choose_effects<'a>(
     let scorer = &search.scorer;
     let (mut ranking, mut hidden, mut excluded) = (Vec::new(), Vec::new(), None);
     let mut model = Explanation { state: base.clone(), added: Vec::new() };
-    let (mut round, mut starts) = (0, 1);
+    let (mut round, mut starts, mut found) = (0, 1, Vec::new());
     while model.added.len() < scorer.settings.most_effects {
         round += 1;
-        let mut trials = search.trials(&model.state, effects, round, model.largest());
+        let mut trials = search.trials(&model.state, effects, round, model.largest(), &found);
         let has_grown =
             add_best(search, &mut model, &mut trials) || add_pair(search, &mut model, &mut trials);
         if !has_grown {
             excluded = excluded_by_a_cloud(search, &model, &mut trials);
             hidden = hidden_by_the_strongest(search, &model, &mut trials);
         }
+        found = trials.iter().filter_map(|one| Found::of(one, scorer.settings)).collect();
         // Of each family the member that was accepted, or the best.
         let mut candidates: Vec<Candidate> =
             trials.into_iter().map(|trial| trial.candidate).collect();

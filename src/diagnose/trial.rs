@@ -10,6 +10,7 @@ use super::ranges::place_by_ranges;
 use super::refit::{Fit, SCOUT, SEARCH};
 use super::scorer::{Scorer, State};
 use super::screen::Screen;
+use super::settings::Diagnosis;
 use super::size::Size;
 use super::space::Space;
 use crate::effects::{Effect, EffectParameter};
@@ -93,6 +94,47 @@ impl Trial<'_> {
     }
 }
 
+/// Where a fit of one more effect has ended. Beside effects that were added since, another fit may begin there: the laws may have
+/// gone where they stand for the effect.
+pub(super) struct Found {
+    name: &'static str,
+    scans: Vec<u16>,
+    /// The unknowns of the scattering models and of the effect.
+    laws: DVector<f64>,
+    own: DVector<f64>,
+}
+
+impl Found {
+    /// The end of a trial beside so many effects, if it gained more than chance.
+    pub fn of(trial: &Trial, settings: &Diagnosis) -> Option<Found> {
+        let Trial { effect, space, fit, candidate, tried, .. } = trial;
+        let numbers = effect.parameters().len();
+        let is_any = fit.ln_likelihood.is_finite()
+            && candidate.gain.is_finite()
+            && candidate.gain >= settings.least_gain_of(numbers, *tried);
+        is_any.then(|| Found {
+            name: effect.name(),
+            scans: effect.scans().to_vec(),
+            laws: fit.at.rows(0, space.base_len()).into_owned(),
+            own: fit.at.rows(fit.at.len() - numbers, numbers).into_owned(),
+        })
+    }
+
+    /// Whether it is of this member of a family.
+    fn is_of(&self, effect: &dyn Effect) -> bool {
+        self.name == effect.name()
+            && self.scans == effect.scans()
+            && self.own.len() == effect.parameters().len()
+    }
+
+    /// The same beside the effects of a model.
+    fn beside(&self, state: &State) -> DVector<f64> {
+        let others = state.fit.at.iter().skip(self.laws.len());
+        let all = self.laws.iter().chain(others).chain(&self.own);
+        DVector::from_iterator(state.fit.at.len() + self.own.len(), all.copied())
+    }
+}
+
 /// Where a fit begins.
 #[derive(Clone)]
 struct Start {
@@ -120,6 +162,7 @@ impl<'p> Search<'p> {
         effects: &[&'a dyn Effect],
         round: usize,
         largest: Largest,
+        found: &[Found],
     ) -> Vec<Trial<'a>> {
         (self.notify)(&format!("round {round}: screening {} effects", effects.len()));
         let screen = self.screen(state);
@@ -129,7 +172,7 @@ impl<'p> Search<'p> {
             .collect();
         let mut trials: Vec<Trial> = absent
             .into_par_iter()
-            .filter_map(|effect| self.promise(state, &screen, *effect, round))
+            .filter_map(|effect| self.promise(state, &screen, *effect, round, found))
             .collect();
         sort(&mut trials);
         self.scout_promising(state, &screen, &mut trials, round);
@@ -152,7 +195,7 @@ impl<'p> Search<'p> {
     /// One effect, fitted to all shots whatever it promises.
     pub fn trial<'a>(&self, state: &State<'a>, effect: &'a dyn Effect) -> Option<Trial<'a>> {
         let screen = self.screen(state);
-        let mut trial = self.promise(state, &screen, effect, 0)?;
+        let mut trial = self.promise(state, &screen, effect, 0, &[])?;
         self.scout(state, &screen, &mut trial);
         self.refit(state, &mut trial);
         Some(trial)
@@ -227,6 +270,7 @@ impl<'p> Search<'p> {
         screen: &Screen,
         effect: &'a dyn Effect,
         round: usize,
+        found: &[Found],
     ) -> Option<Trial<'a>> {
         let space = state.space.with(effect);
         let problem = &self.scorer.problem;
@@ -261,6 +305,10 @@ impl<'p> Search<'p> {
             // Followed whatever it promises: a promise is about a step from the fitted scattering models.
             has_far_start = true;
             starts.push(Start { worth: most, at });
+        }
+        if let Some(found) = found.iter().find(|one| one.is_of(effect)) {
+            has_far_start = true;
+            starts.push(Start { worth: most, at: found.beside(state) });
         }
         let Start { worth, at } = starts.first()?.clone();
         let gain = if is_absent { f64::INFINITY } else { worth };
@@ -494,7 +542,7 @@ mod tests {
 
     /// A drift at its starts.
     fn trial<'a>(search: &Search, state: &State<'a>) -> Trial<'a> {
-        search.promise(state, &search.screen(state), &DRIFT, 1).unwrap()
+        search.promise(state, &search.screen(state), &DRIFT, 1, &[]).unwrap()
     }
 
     #[test]
@@ -526,6 +574,35 @@ mod tests {
             assert!(beside.has_far_start && beside.candidate.gain < settings.least_gain);
             let far = &beside.starts.last().unwrap().at;
             assert!((far.rows(0, laws) - with.fit.at.rows(0, laws)).norm() < 0.05);
+        });
+    }
+
+    #[test]
+    fn where_an_effect_was_found_is_a_start_beside_another() {
+        let settings = Diagnosis { seed: 5, ..Diagnosis::default() };
+        searched((&BOWL, vec![-6.0]), &settings, &|search, space| {
+            let base = search.scorer.base(search.sample, space);
+            let mut first = search.promise(&base, &search.screen(&base), &BOWL, 1, &[]).unwrap();
+            search.refit(&base, &mut first);
+            let found = Found::of(&first, &settings).unwrap();
+            // Beside another effect, with laws that have gone elsewhere.
+            let with = base.space.with(&DRIFT);
+            let mut at = Space::joined(&base.fit.at, &DRIFT, &[0.3]);
+            at[0] += 0.5;
+            let fit = Fit { at, ..base.fit.clone() };
+            let state = State { space: with, fit, held_out: base.held_out.clone() };
+            let start = found.beside(&state);
+            let laws = base.space.base_len();
+            assert_eq!(start.rows(0, laws), first.fit.at.rows(0, laws));
+            assert_eq!(start[laws], state.fit.at[laws]);
+            assert_eq!(start[laws + 1], first.fit.at[laws]);
+            let second =
+                search.promise(&state, &search.screen(&state), &BOWL, 2, &[found]).unwrap();
+            assert_eq!(second.starts.last().unwrap().at, start);
+            // Nothing is kept of an effect that gains no more than chance.
+            let mut drift = trial(search, &base);
+            drift.candidate.gain = 0.0;
+            assert!(Found::of(&drift, &settings).is_none());
         });
     }
 }
