@@ -61,8 +61,8 @@ impl KeyChange {
         }
     }
 
-    /// The names of its tables and its own: the same of all spellings.
-    pub(crate) fn path(&self) -> Vec<String> {
+    /// The names of its tables and its own, which all spellings of a key have in common.
+    pub fn path(&self) -> Vec<String> {
         self.tables.iter().chain([&self.last]).cloned().collect()
     }
 
