@@ -420,6 +420,10 @@ fn what_cannot_be_is_refused_before_the_first_scan() {
         assert!(problem.contains(expected), "{expected}: {problem}");
         assert!(!here.join("ds").exists(), "{expected}");
     }
+    // Options may spell a key in several ways.
+    let thick = "set = { \"mesh.plate.size_m\" = [0.06";
+    write_inputs(here, &SPEC.replace(thick, "set = { ' mesh.\"plate\".size_m' = [0.06"));
+    said(here, &["dataset", "plan", "spec.toml", "-o", "spelled"]);
     write_inputs(here, SPEC);
     // What a plan that was killed may have left.
     fs::create_dir_all(here.join("ds/inputs")).unwrap();

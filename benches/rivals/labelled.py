@@ -166,7 +166,7 @@ class Other:
 
 def by_other(matdb, folder, scans):
     """CPU seconds for each scan."""
-    rows = parquet.read_table(next((folder / "ds-1" / "points").glob("*.parquet")), columns=["scan", "chirp", "xt_m", "yt_m"])
+    rows = parquet.read_table(min((folder / "ds-1" / "points").glob("*.parquet")), columns=["scan", "chirp", "xt_m", "yt_m"])
     rows = rows.to_pandas().query("scan == 0").drop_duplicates("chirp")
     other = Other(meshes(matdb, folder), rows[["xt_m", "yt_m"]].to_numpy(float))
     other.make(0, folder)

@@ -151,3 +151,34 @@ fn stated(report: &str, copy: Option<&PathBuf>, name: &str) -> Result<Vec<(Strin
     }
     Ok(laws)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is said of a report that states this slope of a drift, and its standard deviation.
+    fn said(value: f64, sd: f64) -> Option<String> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("report.json");
+        let number = serde_json::json!({ "value": value, "sd": sd });
+        let effect = serde_json::json!({ "name": "drift", "parameters": { "slope_db": number } });
+        std::fs::write(&path, serde_json::json!({ "effects": [effect] }).to_string()).unwrap();
+        let draw = EffectDraw {
+            name: "drift".to_owned(),
+            share: 1.0,
+            parameters: BTreeMap::new(),
+            report: Some("report.json".to_owned()),
+            material: None,
+        };
+        let law = EffectLaw::new(&draw, &BTreeMap::from([("report.json".to_owned(), path)]));
+        law.err().map(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_report_must_state_numbers_that_can_be() {
+        assert_eq!(said(1.5, 0.2), None);
+        assert_eq!(said(1.5, 0.0), None);
+        assert!(said(1.5, -0.2).unwrap().contains("states slope_db = 1.5 ± -0.2 of `drift`"));
+        assert!(said(200.0, 0.2).unwrap().contains("slope_db = 200, which is out of range"));
+    }
+}

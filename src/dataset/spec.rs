@@ -344,9 +344,12 @@ impl Spec {
             })
         });
         let of_choices = self.choose.iter().flat_map(|choice| {
-            let options = choice.option.iter();
-            let keys: BTreeSet<&String> = options.flat_map(|option| option.set.keys()).collect();
-            keys.into_iter().map(|key| (key.clone(), format!("[[choose]] `{}`", choice.name)))
+            let keys = choice.option.iter().flat_map(|option| option.set.keys());
+            // Options of one choice may spell a key in several ways.
+            let keys: BTreeMap<Vec<String>, &String> =
+                keys.map(|key| (path_of(key), key)).collect();
+            let entry = format!("[[choose]] `{}`", choice.name);
+            keys.into_values().map(move |key| (key.clone(), entry.clone()))
         });
         let of_numbers = self.vary.iter().flat_map(|variation| {
             variation.keys.iter().map(|key| (key.clone(), "[[vary]]".to_owned()))
@@ -355,9 +358,7 @@ impl Spec {
         for (key, entry) in
             of_scans.into_iter().chain(of_places).chain(of_choices).chain(of_numbers)
         {
-            // One key has several spellings. What is no key is refused where the scene is read.
-            let path = KeyChange::new(&key, 0).map_or_else(|_| vec![key.clone()], |key| key.path());
-            if let Some(other) = by.insert(path, entry.clone()) {
+            if let Some(other) = by.insert(path_of(&key), entry.clone()) {
                 let key = key.trim();
                 let problem = format!("`{key}` is drawn twice, by {other} and by {entry}");
                 return Err((problem, "leave it out of one of them"));
@@ -554,6 +555,11 @@ impl EffectDraw {
         }
         Ok(())
     }
+}
+
+/// The names of a key, whatever its spelling. What is no key is refused where the scene is read.
+fn path_of(key: &str) -> Vec<String> {
+    KeyChange::new(key, 0).map_or_else(|_| vec![key.to_owned()], |key| key.path())
 }
 
 /// A value as it is compared with others: a whole number is that of a float.

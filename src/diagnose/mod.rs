@@ -19,7 +19,7 @@
 //! | the promise of an effect | `screen.rs` |
 //! | the score of a model on held-out patches | `folds.rs`, `score.rs`, `scorer.rs` |
 //! | the choice: trials, support, rivals, removal | `trial.rs`, `support.rs`, `choose.rs`, `exchange.rs`, `explanation.rs` |
-//! | what remains | `covariates.rs`, `field.rs`, `residual.rs`, `scatter.rs`, `order.rs`, `remains.rs` |
+//! | what remains | `covariates.rs`, `field.rs`, `residual.rs`, `scatter.rs`, `order.rs`, `waves.rs`, `spectrum.rs`, `remains.rs` |
 //! | controls of the answer | `controls.rs`, `placebo.rs`, `recovery.rs` |
 //! | the report | `report.rs`, `answer.rs` |
 //! | the diagnosis of a measured curve | `curve/` |

@@ -5,7 +5,7 @@
 //! an exponential law. The level is flat, plus that of speckle which neighbours share: the transform of what pairs of shots
 //! share by the vector between them, exp(−2d²/w²), with the likeliest w and both weights (Whittle). Where residuals are
 //! compared by their distance alone, the signs of checkers cancel. Lines lie twice as close as the extent of the target
-//! asks for: a wave between two of them would lose up to half of its power in each direction.
+//! asks for: a wave between two of them would lose up to three fifths of its power in each direction.
 
 use std::collections::BTreeMap;
 
@@ -182,21 +182,19 @@ impl Raster {
         let powers: Vec<f64> = places.iter().map(|place| powers[*place]).collect();
         let widths: Vec<Option<u32>> = std::iter::once(None).chain(WIDTHS.map(Some)).collect();
         let fits = widths.into_par_iter().map(|width| {
-            let shared = match width {
-                Some(steps) => self.shared(&pairs, WIDTH_STEP * f64::from(steps) * self.spot_m),
-                None => vec![1.0; pairs.len()],
-            };
+            let shared = self.shared(&pairs, width);
             let of_places: Vec<f64> = places.iter().map(|place| shared[*place]).collect();
             let weights = weights(&powers, &of_places);
             let levels = of_places.iter().map(|shared| level(weights, *shared));
             let ln_p: f64 =
                 powers.iter().zip(levels).map(|(power, level)| -level.ln() - power / level).sum();
-            (ln_p, shared.iter().map(|shared| level(weights, *shared)).collect::<Vec<f64>>())
+            (ln_p, width, weights)
         });
         // The first of equal ones, whatever the number of threads.
-        let fits: Vec<(f64, Vec<f64>)> = fits.collect();
+        let fits: Vec<(f64, Option<u32>, [f64; 2])> = fits.collect();
         let best = fits.into_iter().reduce(|a, b| if b.0 > a.0 { b } else { a });
-        best.map(|(_, levels)| levels).unwrap_or_default()
+        let Some((_, width, weights)) = best else { return Vec::new() };
+        self.shared(&pairs, width).iter().map(|shared| level(weights, *shared)).collect()
     }
 
     /// Number of pairs of shots by the vector between them.
@@ -208,8 +206,10 @@ impl Raster {
         transform_map(&squares, self.wide).into_iter().map(|sum| sum.re / cells).collect()
     }
 
-    /// The spectrum of speckle that is shared over a width, m.
-    fn shared(&self, pairs: &[f64], width_m: f64) -> Vec<f64> {
+    /// The spectrum of speckle that is shared over a width, in steps of [`WIDTH_STEP`]; a flat one without.
+    fn shared(&self, pairs: &[f64], width: Option<u32>) -> Vec<f64> {
+        let Some(steps) = width else { return vec![1.0; pairs.len()] };
+        let width_m = WIDTH_STEP * f64::from(steps) * self.spot_m;
         let count = self.cells.len() as f64;
         let products = pairs.iter().enumerate().map(|(place, pairs)| {
             let [x, y] = self.steps(place).map(|steps| steps as f64 * self.cell_m);
